@@ -1,0 +1,192 @@
+"""The directions of a reflectance measurement, in the quantities that reflectance models are made of.
+
+Local frame: the normal is +z. With l and v the unit vectors to light and viewer,
+
+    h = (l + v)/|l + v|,   theta_h = angle(n, h),   theta_d = angle(h, l) = angle(h, v).
+
+1 - cos loses all digits where an angle is small, so each angle is carried as a cosine *and* a squared sine, both formed
+without cancellation: sin^2(theta_h) = h_x^2 + h_y^2 and tan(theta_d) = |l - v|/|l + v|.
+
+A ``Geometry`` may be a flat list of samples (all fields ``[n]``) or lie on a grid, where each field has only the axes it
+depends on (``theta_h`` as ``[H, 1, 1]``, ``theta_d`` as ``[1, D, 1]``): models written in array code then evaluate their
+parts on their own axes and let them broadcast.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+
+import equinox as eqx
+import jax.numpy as jnp
+import numpy as np
+from jaxtyping import Array, ArrayLike, Float
+
+from .polar import PolarStencil
+
+Field = Float[Array, "..."]
+
+
+class Geometry(eqx.Module):
+    """Parameter-free quantities of pairs of directions above the horizon. All fields broadcast against each other."""
+
+    cos_i: Field
+    """cos(theta_i) = n.l, in (0, 1]."""
+    cos_o: Field
+    """cos(theta_o) = n.v, in (0, 1]."""
+    cos_h: Field
+    """n.h."""
+    sin2_h: Field
+    """sin^2(theta_h), accurate near 0."""
+    cos_d: Field
+    """l.h = v.h."""
+    sin2_d: Field
+    """sin^2(theta_d), accurate near 0."""
+    h_x2: Field | None = None
+    """Squared tangent component of h; None on isotropic tables, where it is not defined."""
+    h_y2: Field | None = None
+    """Squared bitangent component of h; None on isotropic tables."""
+    stencil_i: PolarStencil | None = None
+    """Where theta_i lies on a table of polar angles; None to evaluate functions of it directly."""
+    stencil_o: PolarStencil | None = None
+
+    @property
+    def shape(self) -> tuple[int, ...]:
+        """Shape that all fields broadcast to."""
+        return np.broadcast_shapes(*(f.shape for f in (self.cos_i, self.cos_o, self.sin2_h, self.cos_d)))
+
+    @property
+    def cos2_h(self) -> Field:
+        """cos^2(theta_h)."""
+        return self.cos_h * self.cos_h
+
+    @property
+    def vers_h(self) -> Field:
+        """1 - cos(theta_h), accurate near 0."""
+        return self.sin2_h / (1 + self.cos_h)
+
+    @property
+    def tan2_h(self) -> Field:
+        """tan^2(theta_h)."""
+        return self.sin2_h / self.cos2_h
+
+    @property
+    def vers_d(self) -> Field:
+        """1 - cos(theta_d), accurate near 0."""
+        return self.sin2_d / (1 + self.cos_d)
+
+    @property
+    def theta_i(self) -> Field:
+        """Polar angle of the light, radians."""
+        return jnp.arccos(jnp.clip(self.cos_i, -1, 1))
+
+    @property
+    def theta_o(self) -> Field:
+        """Polar angle of the viewer, radians."""
+        return jnp.arccos(jnp.clip(self.cos_o, -1, 1))
+
+    @property
+    def theta_h(self) -> Field:
+        """Angle between normal and half vector, radians."""
+        return jnp.arctan2(jnp.sqrt(self.sin2_h), self.cos_h)
+
+    @property
+    def theta_d(self) -> Field:
+        """Angle between half vector and either direction, radians."""
+        return jnp.arctan2(jnp.sqrt(self.sin2_d), self.cos_d)
+
+    @property
+    def phi_d(self) -> Field:
+        """Azimuth of the light about the half vector, folded by mirror symmetry into [0, pi], radians."""
+        across = 2 * jnp.sqrt(self.sin2_h * self.sin2_d)
+        return jnp.arctan2(jnp.sqrt(jnp.maximum(across**2 - (self.cos_o - self.cos_i) ** 2, 0)), self.cos_o - self.cos_i)
+
+    def at_polar(self, function: Callable[[Field], Field]) -> tuple[Field, Field]:
+        """``function(cos(theta))`` at theta_i and theta_o: through the table of polar angles where there is one."""
+        if self.stencil_i is None or self.stencil_o is None:
+            return function(self.cos_i), function(self.cos_o)
+        nodes = self.stencil_i.tabulate(function)
+        return self.stencil_i.interpolate(nodes), self.stencil_o.interpolate(nodes)
+
+    def tangential(self) -> tuple[Field, Field]:
+        """Squared tangent and bitangent components of h.
+
+        Raises ValueError on isotropic tables, which do not have them.
+        """
+        if self.h_x2 is None or self.h_y2 is None:
+            raise ValueError("an anisotropic model needs the azimuth of the half vector, and this table is isotropic")
+        return self.h_x2, self.h_y2
+
+    def flat(self) -> Geometry:
+        """The same geometry with every field broadcast and flattened to ``[n]``; stencils are left out."""
+        shape = self.shape
+        fields = (self.cos_i, self.cos_o, self.cos_h, self.sin2_h, self.cos_d, self.sin2_d, self.h_x2, self.h_y2)
+        return Geometry(*(None if f is None else jnp.broadcast_to(f, shape).reshape(-1) for f in fields))  # type: ignore[arg-type]
+
+
+def from_directions(wi: ArrayLike, wo: ArrayLike) -> Geometry:
+    """Geometry of unit vectors ``[..., 3]`` to light and viewer, in the precision they come in."""
+    wi, wo = jnp.asarray(wi), jnp.asarray(wo)
+    wi, wo = jnp.broadcast_arrays(wi, wo)
+    total, difference = wi + wo, wi - wo
+    total2 = jnp.sum(total * total, -1)
+    difference2 = jnp.sum(difference * difference, -1)
+    # |l + v|^2 + |l - v|^2 is 4 for unit vectors; dividing by it keeps theta_d right for vectors normalised to rounding.
+    square = total2 + difference2
+    h_x2 = total[..., 0] ** 2 / total2
+    h_y2 = total[..., 1] ** 2 / total2
+    return Geometry(
+        cos_i=wi[..., 2],
+        cos_o=wo[..., 2],
+        cos_h=total[..., 2] / jnp.sqrt(total2),
+        sin2_h=h_x2 + h_y2,
+        cos_d=jnp.sqrt(total2 / square),
+        sin2_d=difference2 / square,
+        h_x2=h_x2,
+        h_y2=h_y2,
+    )
+
+
+def directions(
+    theta_h: ArrayLike, theta_d: ArrayLike, phi_d: ArrayLike, phi_h: ArrayLike = 0.0
+) -> tuple[np.ndarray, np.ndarray]:
+    """Unit vectors ``(wi, wo)``, each ``[..., 3]`` float64, of half/difference angles in radians (Rusinkiewicz 1998)."""
+    th, td, pd, ph = np.broadcast_arrays(*(np.asarray(a, float) for a in (theta_h, theta_d, phi_d, phi_h)))
+    out = []
+    for sign in (1.0, -1.0):
+        x, y = sign * np.sin(td) * np.cos(pd), sign * np.sin(td) * np.sin(pd)
+        z = np.cos(td)
+        # rotate by theta_h about +y, then by phi_h about +z; z as in `polar_cosines`, without cancellation
+        u, w = np.cos(th) * x + np.sin(th) * z, polar_cosines(th, td, pd)[0 if sign > 0 else 1]
+        out.append(np.stack([np.cos(ph) * u - np.sin(ph) * y, np.sin(ph) * u + np.cos(ph) * y, w], -1))
+    return out[0], out[1]
+
+
+def polar_cosines(theta_h: np.ndarray, theta_d: np.ndarray, phi_d: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+    """cos(theta_i) and cos(theta_o) of half/difference angles in radians.
+
+    cos_i = cos(theta_h) cos(theta_d) - sin(theta_h) sin(theta_d) cos(phi_d), written as a sum of cos(theta_h + theta_d),
+    taken as the sine of the complement, and a term >= 0, so that nothing cancels up to the horizon.
+    """
+    base = np.sin((np.pi / 2 - theta_h) - theta_d)
+    across = 2 * np.sin(theta_h) * np.sin(theta_d)
+    return base + across * np.sin(phi_d / 2) ** 2, base + across * np.cos(phi_d / 2) ** 2
+
+
+def half_difference(wi: ArrayLike, wo: ArrayLike) -> tuple[np.ndarray, np.ndarray, np.ndarray, np.ndarray]:
+    """Angles ``(theta_h, theta_d, phi_d, phi_h)`` in radians of unit vectors ``[..., 3]``; phi in (-pi, pi].
+
+    The angles of a lobe's centre are exact: theta by arctan2 of a length that does not cancel, never by arccos.
+    """
+    wi, wo = np.broadcast_arrays(np.asarray(wi, float), np.asarray(wo, float))
+    total, difference = wi + wo, wi - wo
+    theta_h = np.arctan2(np.hypot(total[..., 0], total[..., 1]), total[..., 2])
+    theta_d = np.arctan2(np.linalg.norm(difference, axis=-1), np.linalg.norm(total, axis=-1))
+    phi_h = np.arctan2(total[..., 1], total[..., 0])
+    # (l - v)/2 is l without its component along h: turn it back by phi_h and theta_h
+    dx = np.cos(phi_h) * difference[..., 0] + np.sin(phi_h) * difference[..., 1]
+    dy = -np.sin(phi_h) * difference[..., 0] + np.cos(phi_h) * difference[..., 1]
+    x = np.cos(theta_h) * dx - np.sin(theta_h) * difference[..., 2]
+    return theta_h, theta_d, np.arctan2(dy, x), phi_h
+
+
+__all__ = ["Geometry", "directions", "from_directions", "half_difference", "polar_cosines"]

@@ -1,0 +1,110 @@
+"""Reflectance models by name. One file a model; the blocks they share are in ndf/, masking/, fresnel/ and diffuse/."""
+
+from __future__ import annotations
+
+from collections.abc import Iterable
+
+import numpy as np
+from jaxtyping import ArrayLike
+
+from .abc import ABC
+from .ashikhmin_shirley import AshikhminShirley, AshikhminShirleyAnisotropic
+from .base import BRDF, Interval, Parameter, channels, evaluate_channels, parameter, parameters_of
+from .gtr import GTR
+from .lambert import Lambert
+from .sgd import SGD
+from .ward import Ward, WardAnisotropic
+
+MODELS: dict[str, tuple[type[BRDF], ...]] = {
+    "gtr": (GTR,),
+    "abc": (ABC,),
+    "sgd": (SGD,),
+    "ward": (Ward, WardAnisotropic),
+    "ashikhmin_shirley": (AshikhminShirley, AshikhminShirleyAnisotropic),
+    "lambert": (Lambert,),
+}
+"""Every named model: its isotropic form first, then the anisotropic one where there is one."""
+
+
+def variants(name: str) -> tuple[type[BRDF], ...]:
+    """The classes that go by a name. Raises ValueError for a name that is not in :data:`MODELS`."""
+    try:
+        return MODELS[name]
+    except KeyError:
+        raise ValueError(f"unknown model {name!r}: choose from {', '.join(MODELS)}") from None
+
+
+def model(name: str, **parameters: ArrayLike) -> BRDF:
+    """A model with given parameters.
+
+    ``name`` is a key of :data:`MODELS`; parameters are scalars or sequences of one value per channel, and scalars
+    broadcast over channels (three if no parameter says otherwise). Models that have an anisotropic form take either set.
+
+    Raises ValueError for an unknown name and for parameters unknown, missing, or outside the range of the formula.
+    """
+    candidates = variants(name)
+    for candidate in candidates:
+        if {p.name for p in parameters_of(candidate)} == set(parameters):
+            return build(candidate, parameters)
+    wanted = " or ".join(", ".join(p.name for p in parameters_of(c)) for c in candidates)
+    known = {p.name for c in candidates for p in parameters_of(c)}
+    unknown = sorted(set(parameters) - known)
+    if unknown:
+        raise ValueError(f"model {name!r} has no parameter {unknown[0]!r}: it takes {wanted}")
+    closest = max(candidates, key=lambda c: len({p.name for p in parameters_of(c)} & set(parameters)))
+    missing = [p.name for p in parameters_of(closest) if p.name not in parameters]
+    if missing:
+        raise ValueError(f"model {name!r} misses parameter {missing[0]!r}: it takes {wanted}")
+    raise ValueError(f"model {name!r} takes {wanted}, not {', '.join(parameters)} together")
+
+
+def build(cls: type[BRDF], parameters: dict[str, ArrayLike]) -> BRDF:
+    """An instance of ``cls`` with validated parameters as float64 numpy arrays, per-channel ones of one length C.
+
+    Raises ValueError naming the parameter, its range and the value.
+    """
+    specs = parameters_of(cls)
+    values = {p.name: np.asarray(parameters[p.name], dtype=np.float64) for p in specs}
+    lengths = {values[p.name].shape[0] for p in specs if p.per_channel and values[p.name].ndim == 1}
+    lengths = lengths - {1} or lengths or {3}
+    if len(lengths) > 1:
+        raise ValueError(f"model {cls.name!r}: parameters disagree on the number of channels, {sorted(lengths)}")
+    count = lengths.pop()
+    for p in specs:
+        v = values[p.name]
+        if v.ndim > (1 if p.per_channel else 0):
+            kind = "a scalar or one value per channel" if p.per_channel else "a scalar"
+            raise ValueError(f"model {cls.name!r}: parameter {p.name!r} is {kind}, not of shape {list(v.shape)}")
+        for x in v.ravel():
+            if x not in p.valid:
+                raise ValueError(f"model {cls.name!r}: parameter {p.name!r} must lie in {p.valid}, not {x:g}")
+        if p.per_channel:
+            values[p.name] = np.broadcast_to(v, (count,)).copy()
+    return cls(**values)
+
+
+def parameter_values(m: BRDF) -> dict[str, np.ndarray]:
+    """The parameters of an instance as numpy arrays, by name."""
+    return {p.name: np.asarray(getattr(m, p.name)) for p in parameters_of(m)}
+
+
+def names() -> Iterable[str]:
+    """Names of all models."""
+    return MODELS.keys()
+
+
+__all__ = [
+    "BRDF",
+    "MODELS",
+    "Interval",
+    "Parameter",
+    "build",
+    "channels",
+    "evaluate_channels",
+    "model",
+    "names",
+    "parameter",
+    "parameter_values",
+    "parameters_of",
+    "variants",
+]

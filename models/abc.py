@@ -1,0 +1,45 @@
+"""ABC: Low's microfacet model, a two-parameter lobe with dielectric Fresnel and V-cavity masking."""
+
+from __future__ import annotations
+
+from typing import ClassVar
+
+from jaxtyping import Array, Float
+
+from ..geometry import Geometry
+from . import ndf
+from .base import BRDF, NOT_NEGATIVE, POSITIVE, Interval, parameter
+from .common import diffuse_parameter
+from .diffuse import lambert
+from .fresnel import dielectric
+from .masking import vcavity
+from .microfacet import microfacet
+
+
+class ABC(BRDF):
+    """f = diffuse/pi + specular F_dielectric(ior, c_d) D_abc G_vcavity / (4 n.l n.v) (Low et al. 2012, eq. 15).
+
+    Low et al. leave D unnormalised and divide by pi; here D is normalised, so that specular is a scale near 1.
+    Reciprocal; energy is not bounded by the form, since specular and ior both scale the lobe.
+    Known failures: specular and ior trade off along a ridge; the derivative in ior nearly vanishes at ior 7.6 to 11, and
+    most materials have a second optimum at ior -> infinity.
+    """
+
+    name: ClassVar[str] = "abc"
+    references: ClassVar[tuple[str, ...]] = ("low2012", "church1990", "cook1982")
+
+    diffuse: Float[Array, "C"] = diffuse_parameter()
+    specular: Float[Array, "C"] = parameter(
+        "scale of the lobe", per_channel=True, linear=True, valid=NOT_NEGATIVE, default=1.0
+    )
+    b: Float[Array, ""] = parameter("inverse width of the lobe", valid=POSITIVE, search=(1e-2, 1e9), default=100, log=True)
+    c: Float[Array, ""] = parameter("fall-off of the tail", valid=NOT_NEGATIVE, search=(1e-3, 1e4), default=1, log=True)
+    ior: Float[Array, ""] = parameter(
+        "index of refraction", valid=Interval(1, open_lower=True), search=(1.001, 1001), default=1.5, log=True
+    )
+
+    def evaluate(self, g: Geometry) -> Float[Array, "..."]:
+        """Value in 1/sr."""
+        lobe = ndf.ABC(self.b, self.c)
+        f = self.specular * dielectric(self.ior, g)
+        return lambert(self.diffuse) + microfacet(lobe(g.sin2_h, g.cos2_h), f, vcavity(g), g)

@@ -1,0 +1,73 @@
+"""Ashikhmin-Shirley: a Phong lobe of the half vector with Schlick's Fresnel and a body term that gives way to it."""
+
+from __future__ import annotations
+
+from typing import Any, ClassVar
+
+import jax.numpy as jnp
+from jaxtyping import Array, Float
+
+from ..geometry import Geometry
+from . import ndf
+from .base import BRDF, NOT_NEGATIVE, Interval, parameter
+from .common import diffuse_parameter
+from .diffuse import ashikhmin_shirley_body
+from .fresnel import schlick
+
+
+def _exponent(meaning: str) -> Any:
+    return parameter(meaning, valid=NOT_NEGATIVE, search=(1e-3, 1e7), default=100, log=True)
+
+
+def _specular() -> Any:
+    return parameter(
+        "reflectance at normal incidence, Rs",
+        per_channel=True,
+        linear=True,
+        valid=Interval(0, 1),
+        search=(0, 1 - 1e-9),
+        default=0.04,
+    )
+
+
+class AshikhminShirley(BRDF):
+    """f = 28 diffuse/(23 pi) (1 - specular)(1 - (1 - n.v/2)^5)(1 - (1 - n.l/2)^5)
+    + (e + 1)/(8 pi) (n.h)^e F_schlick(specular, c_d) / (c_d max(n.l, n.v)) (Ashikhmin & Shirley 2000, eq. 4 and 5).
+
+    Reciprocal; conserves energy for diffuse, specular <= 1. Known failure: on rough materials the best fit uses the lobe
+    (exponent -> 0) as body term.
+    """
+
+    name: ClassVar[str] = "ashikhmin_shirley"
+    references: ClassVar[tuple[str, ...]] = ("ashikhmin2000", "schlick1994")
+
+    diffuse: Float[Array, "C"] = diffuse_parameter()
+    specular: Float[Array, "C"] = _specular()
+    exponent: Float[Array, ""] = _exponent("Phong exponent of the lobe")
+
+    def evaluate(self, g: Geometry) -> Float[Array, "..."]:
+        """Value in 1/sr."""
+        d = ndf.power_cosine(g.sin2_h, self.exponent)
+        lobe = schlick(self.specular, g) * (d / (4 * g.cos_d * jnp.maximum(g.cos_i, g.cos_o)))
+        return ashikhmin_shirley_body(self.diffuse, self.specular, g) + lobe
+
+
+class AshikhminShirleyAnisotropic(BRDF):
+    """As :class:`AshikhminShirley` with sqrt((e_x+1)(e_y+1)) (n.h)^((e_x h_x^2 + e_y h_y^2)/(h_x^2 + h_y^2)) for the lobe
+    (Ashikhmin & Shirley 2000, eq. 4), which it equals for exponent_x = exponent_y.
+    """
+
+    name: ClassVar[str] = "ashikhmin_shirley"
+    references: ClassVar[tuple[str, ...]] = ("ashikhmin2000", "schlick1994")
+    anisotropic: ClassVar[bool] = True
+
+    diffuse: Float[Array, "C"] = diffuse_parameter()
+    specular: Float[Array, "C"] = _specular()
+    exponent_x: Float[Array, ""] = _exponent("Phong exponent along the tangent")
+    exponent_y: Float[Array, ""] = _exponent("Phong exponent along the bitangent")
+
+    def evaluate(self, g: Geometry) -> Float[Array, "..."]:
+        """Value in 1/sr."""
+        d = ndf.power_cosine_anisotropic(*g.tangential(), self.exponent_x, self.exponent_y)
+        lobe = schlick(self.specular, g) * (d / (4 * g.cos_d * jnp.maximum(g.cos_i, g.cos_o)))
+        return ashikhmin_shirley_body(self.diffuse, self.specular, g) + lobe

@@ -1,0 +1,160 @@
+"""What a reflectance model is: parameters that say what they mean, and a formula for one channel."""
+
+from __future__ import annotations
+
+import abc
+import math
+from dataclasses import dataclass, fields, replace
+from typing import Any, ClassVar
+
+import equinox as eqx
+import jax
+import jax.numpy as jnp
+import numpy as np
+from jaxtyping import Array, ArrayLike, Float
+
+from ..geometry import Geometry, from_directions
+
+
+@dataclass(frozen=True)
+class Interval:
+    """A range of real numbers; an infinite end is open, a finite one open only where said."""
+
+    lower: float = -math.inf
+    upper: float = math.inf
+    open_lower: bool = False
+    open_upper: bool = False
+
+    def __contains__(self, value: object) -> bool:
+        v = float(value)  # type: ignore[arg-type]
+        above = v > self.lower if self.open_lower else v >= self.lower
+        below = v < self.upper if self.open_upper else v <= self.upper
+        return math.isfinite(v) and above and below
+
+    def __str__(self) -> str:
+        left = "(" if self.open_lower or math.isinf(self.lower) else "["
+        right = ")" if self.open_upper or math.isinf(self.upper) else "]"
+        return f"{left}{self.lower:g}, {self.upper:g}{right}"
+
+
+POSITIVE = Interval(0, open_lower=True)
+NOT_NEGATIVE = Interval(0)
+REAL = Interval()
+
+
+@dataclass(frozen=True)
+class Parameter:
+    """What one parameter of a model means and where it may lie.
+
+    ``valid`` is where the formula is defined; ``search`` is the narrower box that a fit searches by default; ``log``
+    says that a fit works in its logarithm; ``linear`` that the BRDF is affine in it when the others are held fixed.
+    """
+
+    name: str
+    meaning: str
+    unit: str
+    valid: Interval
+    search: tuple[float, float]
+    default: float
+    per_channel: bool = False
+    log: bool = False
+    linear: bool = False
+
+
+def parameter(
+    meaning: str,
+    *,
+    valid: Interval = NOT_NEGATIVE,
+    search: tuple[float, float] | None = None,
+    default: float = 1.0,
+    unit: str = "1",
+    per_channel: bool = False,
+    log: bool = False,
+    linear: bool = False,
+) -> Any:
+    """Declare a parameter as a field of a model; see :class:`Parameter` for the arguments.
+
+    ``search`` defaults to ``valid``; with ``log`` its lower end must be positive.
+    """
+    box = search if search is not None else (valid.lower, valid.upper)
+    if log and not box[0] > 0:
+        raise ValueError(f"parameter {meaning!r}: log needs a search box with a positive lower end, not {box}")
+    spec = Parameter("", meaning, unit, valid, box, default, per_channel, log, linear)
+    return eqx.field(metadata={"parameter": spec})
+
+
+def parameters_of(model: type[eqx.Module] | eqx.Module) -> tuple[Parameter, ...]:
+    """The declared parameters of a model class or instance, in order."""
+    return tuple(replace(f.metadata["parameter"], name=f.name) for f in fields(model) if "parameter" in f.metadata)  # type: ignore[arg-type]
+
+
+class BRDF(eqx.Module):
+    """A reflectance model: declared parameters and :meth:`evaluate`, the formula for one channel.
+
+    Parameters of an instance have shape ``[C]`` (per channel) or ``[]`` (shared). Instances are JAX pytrees.
+    """
+
+    name: ClassVar[str]
+    """The name it goes by on the command line and in files."""
+    references: ClassVar[tuple[str, ...]] = ()
+    """Keys of ``brdfit.references`` for what the model is made of."""
+    anisotropic: ClassVar[bool] = False
+    """Whether the value depends on the azimuth of the half vector."""
+
+    @abc.abstractmethod
+    def evaluate(self, g: Geometry) -> Float[Array, "..."]:
+        """BRDF in 1/sr for directions above the horizon, with every parameter a scalar (one channel at a time)."""
+
+    def __call__(self, wi: ArrayLike, wo: ArrayLike) -> Float[Array, "... C"]:
+        """BRDF in 1/sr, ``[..., C]``, for unit vectors ``[..., 3]`` to the light and the viewer.
+
+        Zero, with zero gradient, where either direction is at or below the horizon.
+        """
+        wi, wo = jnp.broadcast_arrays(jnp.asarray(wi), jnp.asarray(wo))
+        above = (wi[..., 2] > 0) & (wo[..., 2] > 0)
+        # Guard the input: below the horizon models divide by zero or take roots of negative numbers, and 0 * inf = NaN
+        # in the gradient (tests/test_models.py::test_below_the_horizon).
+        normal = jnp.zeros(3, wi.dtype).at[2].set(1)
+        g = from_directions(jnp.where(above[..., None], wi, normal), jnp.where(above[..., None], wo, normal))
+        return jnp.where(above[..., None], evaluate_channels(self, g), 0)
+
+
+def channel_axes(model: BRDF, channel: Any = 0, shared: Any = None) -> BRDF:
+    """A pytree like ``model`` with ``channel`` at its per-channel parameters and ``shared`` at the others."""
+    per_channel = {p.name: p.per_channel for p in parameters_of(model)}
+    names = list(per_channel)
+    return eqx.tree_at(
+        lambda m: [getattr(m, n) for n in names],
+        model,
+        [channel if per_channel[n] else shared for n in names],
+        is_leaf=lambda x: x is None,
+    )
+
+
+def channels(model: BRDF) -> int:
+    """Number of channels C of an instance."""
+    return max([np.shape(getattr(model, p.name))[0] for p in parameters_of(model) if p.per_channel], default=1)
+
+
+def evaluate_channels(model: BRDF, g: Geometry, out_axis: int = -1) -> Float[Array, "... C"]:
+    """``model.evaluate`` for each channel, stacked along ``out_axis``; what no channel changes is computed once."""
+    shape = g.shape
+
+    def one(m: BRDF) -> Array:
+        return jnp.broadcast_to(m.evaluate(g), shape)
+
+    return jax.vmap(one, in_axes=(channel_axes(model),), out_axes=out_axis, axis_size=channels(model))(model)
+
+
+__all__ = [
+    "BRDF",
+    "NOT_NEGATIVE",
+    "POSITIVE",
+    "REAL",
+    "Interval",
+    "Parameter",
+    "channels",
+    "evaluate_channels",
+    "parameter",
+    "parameters_of",
+]

@@ -1,0 +1,4 @@
+"""Body reflection: light that entered the material and came out again."""
+
+from .ashikhmin_shirley import ashikhmin_shirley_body as ashikhmin_shirley_body
+from .lambert import lambert as lambert

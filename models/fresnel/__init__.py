@@ -1,0 +1,6 @@
+"""Fresnel reflectance as a function of cos(theta_d), by the ways models parametrise it."""
+
+from .dielectric import dielectric as dielectric
+from .dielectric import dielectric_f0 as dielectric_f0
+from .schlick import schlick as schlick
+from .schlick import sgd_fresnel as sgd_fresnel

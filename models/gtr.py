@@ -1,0 +1,43 @@
+"""GTR: Burley's generalised Trowbridge-Reitz lobe with Schlick's Fresnel and its own exact Smith masking."""
+
+from __future__ import annotations
+
+from typing import ClassVar
+
+from jaxtyping import Array, Float
+
+from ..geometry import Geometry
+from . import ndf
+from .base import BRDF, NOT_NEGATIVE, POSITIVE, parameter
+from .common import diffuse_parameter
+from .diffuse import lambert
+from .fresnel import schlick
+from .masking import smith_correlated
+from .microfacet import microfacet
+
+
+class GTR(BRDF):
+    """f = diffuse/pi + F_schlick(specular, c_d) D_gtr G / (4 n.l n.v), G height-correlated Smith of D_gtr itself.
+
+    Reciprocal. The lobe conserves energy for specular <= 1; the sum need not (the body term ignores the lobe).
+    Known failures: as alpha -> 0 the lobe becomes a power law in which alpha only scales specular against the grazing
+    term (a ridge); as gamma -> infinity only gamma (1/alpha^2 - 1) is determined.
+    """
+
+    name: ClassVar[str] = "gtr"
+    references: ClassVar[tuple[str, ...]] = ("burley2012", "schlick1994", "smith1967", "heitz2014")
+
+    diffuse: Float[Array, "C"] = diffuse_parameter()
+    specular: Float[Array, "C"] = parameter(
+        "reflectance at normal incidence, F0", per_channel=True, linear=True, valid=NOT_NEGATIVE, search=(0, 1), default=0.04
+    )
+    alpha: Float[Array, ""] = parameter("lobe width", valid=POSITIVE, search=(1e-9, 10), default=0.1, log=True)
+    gamma: Float[Array, ""] = parameter(
+        "fall-off of the tail (2: GGX, 1: Berry)", valid=POSITIVE, search=(0.01, 1e7), default=2, log=True
+    )
+
+    def evaluate(self, g: Geometry) -> Float[Array, "..."]:
+        """Value in 1/sr."""
+        lobe = ndf.GTR(self.alpha, self.gamma)
+        f = schlick(self.specular, g)
+        return lambert(self.diffuse) + microfacet(lobe(g.sin2_h, g.cos2_h), f, smith_correlated(lobe, g), g)

@@ -1,0 +1,14 @@
+"""Normal distribution functions D(m), in 1/sr, of the half vector.
+
+Isotropic ones are called with ``(sin^2, cos^2)`` of the angle to the normal, both accurate where they are small, so that
+the same object serves a BRDF (at the half vector) and Smith's integral (at every microfacet). Each is normalised:
+the integral of D(m) (n.m) over the hemisphere is 1 (Hoffman 2013, eq. 15).
+"""
+
+from .abc import ABC as ABC
+from .gaussian_slopes import anisotropic_gaussian as anisotropic_gaussian
+from .gaussian_slopes import gaussian as gaussian
+from .gtr import GTR as GTR
+from .power_cosine import power_cosine as power_cosine
+from .power_cosine import power_cosine_anisotropic as power_cosine_anisotropic
+from .sgd import SGD as SGD

@@ -1,0 +1,47 @@
+"""SGD: Bagher's shifted gamma distribution with exact Smith masking, every parameter per channel."""
+
+from __future__ import annotations
+
+from typing import ClassVar
+
+from jaxtyping import Array, Float
+
+from ..geometry import Geometry
+from . import ndf
+from .base import BRDF, NOT_NEGATIVE, POSITIVE, REAL, parameter
+from .common import diffuse_parameter
+from .diffuse import lambert
+from .fresnel import sgd_fresnel
+from .masking import smith_separable
+from .microfacet import microfacet
+
+
+class SGD(BRDF):
+    """f = diffuse/pi + specular F_sgd D_sgd G1(l) G1(v) / (4 n.l n.v), G1 the exact Smith masking of D_sgd.
+
+    Bagher et al. (2012) divide by pi instead of 4 and use a fitted approximation of G1; both are absorbed here (see the
+    published presets for their exact form). Reciprocal. Known failures: F_sgd is negative somewhere in published fits and
+    so can the value be; specular -> 0 with specular f0 finite is a real optimum of some channels, and f0 is then huge.
+    """
+
+    name: ClassVar[str] = "sgd"
+    references: ClassVar[tuple[str, ...]] = ("bagher2012", "smith1967", "heitz2014")
+
+    diffuse: Float[Array, "C"] = diffuse_parameter()
+    specular: Float[Array, "C"] = parameter(
+        "scale of the lobe", per_channel=True, linear=True, valid=NOT_NEGATIVE, search=(1e-12, float("inf")), default=0.5
+    )
+    alpha: Float[Array, "C"] = parameter(
+        "lobe width (mean square slope)", per_channel=True, valid=POSITIVE, search=(1e-7, 30), default=0.1, log=True
+    )
+    p: Float[Array, "C"] = parameter(
+        "fall-off of the tail", per_channel=True, valid=REAL, search=(-10, 60), default=0.5
+    )
+    f0: Float[Array, "C"] = parameter("Fresnel constant", per_channel=True, linear=True, valid=REAL, default=0.04)
+    f1: Float[Array, "C"] = parameter("Fresnel linear term", per_channel=True, linear=True, valid=REAL, default=0.0)
+
+    def evaluate(self, g: Geometry) -> Float[Array, "..."]:
+        """Value in 1/sr."""
+        lobe = ndf.SGD(self.alpha, self.p)
+        f = self.specular * sgd_fresnel(self.f0, self.f1, g)
+        return lambert(self.diffuse) + microfacet(lobe(g.sin2_h, g.cos2_h), f, smith_separable(lobe, g), g)

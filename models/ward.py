@@ -1,0 +1,63 @@
+"""Ward: a Gaussian of slopes, isotropic or elliptical."""
+
+from __future__ import annotations
+
+from typing import Any, ClassVar
+
+import jax.numpy as jnp
+from jaxtyping import Array, Float
+
+from ..geometry import Geometry
+from . import ndf
+from .base import BRDF, NOT_NEGATIVE, POSITIVE, parameter
+from .common import diffuse_parameter
+from .diffuse import lambert
+
+
+def _width(meaning: str) -> Any:
+    return parameter(meaning, valid=POSITIVE, search=(1e-4, 30), default=0.15, log=True)
+
+
+def _specular() -> Any:
+    return parameter("scale of the lobe", per_channel=True, linear=True, valid=NOT_NEGATIVE, default=0.2)
+
+
+class Ward(BRDF):
+    """f = diffuse/pi + specular exp(-tan^2(theta_h)/alpha^2) / (4 pi alpha^2 sqrt(n.l n.v)) (Ward 1992, eq. 4).
+
+    Reciprocal. Does not conserve energy: for large alpha the albedo of the lobe exceeds specular, and 1, at grazing.
+    Has no Fresnel term and no masking: the rise towards grazing is that of 1/sqrt(n.l n.v) alone.
+    """
+
+    name: ClassVar[str] = "ward"
+    references: ClassVar[tuple[str, ...]] = ("ward1992",)
+
+    diffuse: Float[Array, "C"] = diffuse_parameter()
+    specular: Float[Array, "C"] = _specular()
+    alpha: Float[Array, ""] = _width("lobe width (rms slope times sqrt 2)")
+
+    def evaluate(self, g: Geometry) -> Float[Array, "..."]:
+        """Value in 1/sr."""
+        d = ndf.gaussian(g.tan2_h, self.alpha)
+        return lambert(self.diffuse) + self.specular * (d / (4 * jnp.sqrt(g.cos_i * g.cos_o)))
+
+
+class WardAnisotropic(BRDF):
+    """f = diffuse/pi + specular exp(-tan^2 (cos^2 phi_h/alpha_x^2 + sin^2 phi_h/alpha_y^2)) / (4 pi alpha_x alpha_y
+    sqrt(n.l n.v)) (Ward 1992, eq. 5). As :class:`Ward`, which it equals for alpha_x = alpha_y.
+    """
+
+    name: ClassVar[str] = "ward"
+    references: ClassVar[tuple[str, ...]] = ("ward1992",)
+    anisotropic: ClassVar[bool] = True
+
+    diffuse: Float[Array, "C"] = diffuse_parameter()
+    specular: Float[Array, "C"] = _specular()
+    alpha_x: Float[Array, ""] = _width("lobe width along the tangent")
+    alpha_y: Float[Array, ""] = _width("lobe width along the bitangent")
+
+    def evaluate(self, g: Geometry) -> Float[Array, "..."]:
+        """Value in 1/sr."""
+        x2, y2 = g.tangential()
+        d = ndf.anisotropic_gaussian(x2, y2, g.cos2_h, self.alpha_x, self.alpha_y)
+        return lambert(self.diffuse) + self.specular * (d / (4 * jnp.sqrt(g.cos_i * g.cos_o)))

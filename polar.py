@@ -1,0 +1,67 @@
+"""Functions of one polar angle on a table: computed once for each set of parameters, not once for each cell.
+
+Smith masking is an integral for each polar angle. A table of a million cells holds a million polar angles, but the
+function is smooth: it is evaluated at a few Chebyshev nodes, carried to a fine uniform grid by one small matrix, and read
+off at the cells by a four-point (cubic Lagrange) stencil whose positions are computed once per table.
+
+Error: 64 Chebyshev nodes over [0, 80 degrees] give 3e-9 relative for the exact Smith integral of the lobes in use;
+the cubic stencil on 1024 intervals adds h^4/43 max|f''''|, below 1e-10 there (tests/test_polar.py measures both).
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from functools import lru_cache
+
+import equinox as eqx
+import jax.numpy as jnp
+import numpy as np
+from jaxtyping import Array, Float, Int
+
+NODES = 64
+INTERVALS = 1024
+
+
+@lru_cache(maxsize=8)
+def _tables(max_angle: float, dtype: str) -> tuple[np.ndarray, np.ndarray]:
+    """cos of the Chebyshev angles ``[NODES]`` and the matrix ``[INTERVALS + 1, NODES]`` to the uniform angles."""
+    k = np.arange(NODES)
+    x = np.cos(np.pi * (2 * k + 1) / (2 * NODES))
+    uniform = np.linspace(-1, 1, INTERVALS + 1)
+    # barycentric weights of Chebyshev points of the first kind (Berrut & Trefethen 2004, eq. 5.3)
+    weight = (-1.0) ** k * np.sin(np.pi * (2 * k + 1) / (2 * NODES))
+    gap = uniform[:, None] - x
+    exact = gap == 0
+    matrix = weight / np.where(exact, 1.0, gap)
+    matrix /= matrix.sum(1, keepdims=True)
+    matrix = np.where(exact.any(1, keepdims=True), exact.astype(float), matrix)
+    return np.cos((x + 1) / 2 * max_angle).astype(dtype), matrix.astype(dtype)
+
+
+class PolarStencil(eqx.Module):
+    """Positions of polar angles on a uniform table over [0, ``max_angle``] radians."""
+
+    index: Int[Array, "..."]
+    fraction: Float[Array, "..."]
+    max_angle: float = eqx.field(static=True)
+
+    @staticmethod
+    def of(cosine: np.ndarray, max_angle: float) -> PolarStencil:
+        """Stencil of angles given by their cosines, all within [0, max_angle]."""
+        position = np.arccos(np.clip(cosine, -1, 1)) * (INTERVALS / max_angle)
+        # the stencil's four points are index-1 .. index+2, so the first and last interval lean inwards
+        index = np.clip(position.astype(np.int32), 1, INTERVALS - 2)
+        return PolarStencil(index, position - index, max_angle)  # type: ignore[arg-type]
+
+    def tabulate(self, function: Callable[[Array], Array]) -> Array:
+        """``function(cos(theta))`` on the uniform table, ``[INTERVALS + 1]``."""
+        cosines, matrix = _tables(self.max_angle, str(self.fraction.dtype))
+        return jnp.asarray(matrix) @ function(jnp.asarray(cosines))
+
+    def interpolate(self, nodes: Array) -> Array:
+        """Values at the stencil's positions, its shape, from values on the uniform table."""
+        t = self.fraction
+        below, above = t + 1, t - 1
+        beyond = t - 2
+        weights = (-t * above * beyond / 6, below * above * beyond / 2, -below * t * beyond / 2, below * t * above / 6)
+        return sum(w * nodes[self.index + (k - 1)] for k, w in enumerate(weights))  # type: ignore[return-value]

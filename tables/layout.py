@@ -1,0 +1,141 @@
+"""Where the samples of a table lie, and how much of the directions each stands for.
+
+The measure of a sample is the solid angle of light times that of the viewer, dl dv, *integrated over its cell*; on the
+half/difference grid dl dv = 4 cos(theta_d) sin(theta_h) sin(theta_d) dtheta_h dtheta_d dphi_d dphi_h.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+from ..geometry import directions, polar_cosines
+
+Reals = NDArray[np.float64]
+
+
+@dataclass(frozen=True, eq=False)
+class HalfDifferenceGrid:
+    """Rusinkiewicz' half/difference angles on a grid, isotropic (``phi_h`` None) or anisotropic.
+
+    Positions are where the values hold; edges bound the cell that each stands for, one more than positions. All angles
+    are in radians. An axis ``phi_d`` over [0, pi] assumes reciprocity; one over [0, 2 pi] does not.
+    """
+
+    theta_h: Reals
+    theta_d: Reals
+    phi_d: Reals
+    theta_h_edges: Reals
+    theta_d_edges: Reals
+    phi_d_edges: Reals
+    phi_h: Reals | None = None
+    phi_h_edges: Reals | None = None
+
+    @property
+    def isotropic(self) -> bool:
+        """Whether the azimuth of the half vector is left out."""
+        return self.phi_h is None
+
+    @property
+    def shape(self) -> tuple[int, ...]:
+        """``(H, D, P)``, or ``(Q, H, D, P)`` with the azimuth of the half vector first."""
+        base = (len(self.theta_h), len(self.theta_d), len(self.phi_d))
+        return base if self.phi_h is None else (len(self.phi_h), *base)
+
+    def solid_angle(self) -> Reals:
+        """Measure of each cell in sr^2, broadcastable to :attr:`shape` (an isotropic cell spans all of phi_h)."""
+        h = -np.diff(np.cos(self.theta_h_edges))[:, None, None]
+        d = 2 * np.diff(np.sin(self.theta_d_edges) ** 2)[:, None]
+        m: Reals = h * d * np.diff(self.phi_d_edges)
+        if self.phi_h_edges is None:
+            return 2 * np.pi * m
+        return np.diff(self.phi_h_edges)[:, None, None, None] * m
+
+    def polar_cosines(self) -> tuple[Reals, Reals]:
+        """cos(theta_i) and cos(theta_o) of every cell, of shape ``(H, D, P)``; negative below the horizon."""
+        return polar_cosines(self.theta_h[:, None, None], self.theta_d[:, None], self.phi_d)
+
+    def directions(self) -> tuple[Reals, Reals]:
+        """Unit vectors to light and viewer, each ``[*shape, 3]``."""
+        if self.phi_h is None:
+            return directions(self.theta_h[:, None, None], self.theta_d[:, None], self.phi_d)
+        return directions(self.theta_h[:, None, None], self.theta_d[:, None], self.phi_d, self.phi_h[:, None, None, None])
+
+
+@dataclass(frozen=True, eq=False)
+class SphericalGrid:
+    """Polar angle and azimuth of light and viewer on a grid, as goniometers scan it; radians.
+
+    ``phi_i`` is None on isotropic tables: the light then has azimuth 0.
+    """
+
+    theta_i: Reals
+    theta_o: Reals
+    phi_o: Reals
+    theta_i_edges: Reals
+    theta_o_edges: Reals
+    phi_o_edges: Reals
+    phi_i: Reals | None = None
+    phi_i_edges: Reals | None = None
+
+    @property
+    def isotropic(self) -> bool:
+        """Whether the azimuth of the light is left out."""
+        return self.phi_i is None
+
+    @property
+    def shape(self) -> tuple[int, ...]:
+        """``(I, O, P)``, or ``(Q, I, O, P)`` with the azimuth of the light first."""
+        base = (len(self.theta_i), len(self.theta_o), len(self.phi_o))
+        return base if self.phi_i is None else (len(self.phi_i), *base)
+
+    def solid_angle(self) -> Reals:
+        """Measure of each cell in sr^2, broadcastable to :attr:`shape`."""
+        i = -np.diff(np.cos(self.theta_i_edges))[:, None, None]
+        o = -np.diff(np.cos(self.theta_o_edges))[:, None]
+        m: Reals = i * o * np.diff(self.phi_o_edges)
+        if self.phi_i_edges is None:
+            return 2 * np.pi * m
+        return np.diff(self.phi_i_edges)[:, None, None, None] * m
+
+    def directions(self) -> tuple[Reals, Reals]:
+        """Unit vectors to light and viewer, each ``[*shape, 3]``."""
+        phi_i = np.zeros(()) if self.phi_i is None else self.phi_i[:, None, None, None]
+        wi = _unit(self.theta_i[:, None, None], phi_i)
+        wo = _unit(self.theta_o[:, None], self.phi_o)
+        shape = (*self.shape, 3)
+        return np.broadcast_to(wi, shape), np.broadcast_to(wo, shape)
+
+
+@dataclass(frozen=True, eq=False)
+class Scattered:
+    """Samples at directions of their own: unit vectors ``[n, 3]`` and the measure ``[n]`` each stands for, in sr^2."""
+
+    wi: Reals
+    wo: Reals
+    measure: Reals
+    isotropic: bool = False
+
+    @property
+    def shape(self) -> tuple[int, ...]:
+        """``(n,)``."""
+        return (len(self.wi),)
+
+    def solid_angle(self) -> Reals:
+        """Measure of each sample in sr^2, ``[n]``."""
+        return self.measure
+
+    def directions(self) -> tuple[Reals, Reals]:
+        """Unit vectors to light and viewer, each ``[n, 3]``."""
+        return self.wi, self.wo
+
+
+Layout = HalfDifferenceGrid | SphericalGrid | Scattered
+
+
+def _unit(theta: Reals, phi: Reals) -> Reals:
+    theta, phi = np.broadcast_arrays(theta, phi)
+    # cos(theta) as the sine of the complement keeps its digits at grazing
+    return np.stack([np.sin(theta) * np.cos(phi), np.sin(theta) * np.sin(phi), np.sin(np.pi / 2 - theta)], -1)
