@@ -5,9 +5,13 @@ from __future__ import annotations
 from typing import TYPE_CHECKING, Any
 
 if TYPE_CHECKING:
+    from .errors import InputError as InputError
     from .models import BRDF as BRDF
     from .models import model as model
     from .models import parameter as parameter
+    from .tables import Table as Table
+    from .tables import load as load
+    from .tables import save as save
 
 __version__ = "0.1.0"
 
@@ -15,8 +19,12 @@ __version__ = "0.1.0"
 # file do not wait for JAX.
 _PUBLIC = {
     "BRDF": "models",
+    "InputError": "errors",
+    "Table": "tables",
+    "load": "tables",
     "model": "models",
     "parameter": "models",
+    "save": "tables",
 }
 
 

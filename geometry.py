@@ -146,47 +146,4 @@ def from_directions(wi: ArrayLike, wo: ArrayLike) -> Geometry:
     )
 
 
-def directions(
-    theta_h: ArrayLike, theta_d: ArrayLike, phi_d: ArrayLike, phi_h: ArrayLike = 0.0
-) -> tuple[np.ndarray, np.ndarray]:
-    """Unit vectors ``(wi, wo)``, each ``[..., 3]`` float64, of half/difference angles in radians (Rusinkiewicz 1998)."""
-    th, td, pd, ph = np.broadcast_arrays(*(np.asarray(a, float) for a in (theta_h, theta_d, phi_d, phi_h)))
-    out = []
-    for sign in (1.0, -1.0):
-        x, y = sign * np.sin(td) * np.cos(pd), sign * np.sin(td) * np.sin(pd)
-        z = np.cos(td)
-        # rotate by theta_h about +y, then by phi_h about +z; z as in `polar_cosines`, without cancellation
-        u, w = np.cos(th) * x + np.sin(th) * z, polar_cosines(th, td, pd)[0 if sign > 0 else 1]
-        out.append(np.stack([np.cos(ph) * u - np.sin(ph) * y, np.sin(ph) * u + np.cos(ph) * y, w], -1))
-    return out[0], out[1]
-
-
-def polar_cosines(theta_h: np.ndarray, theta_d: np.ndarray, phi_d: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
-    """cos(theta_i) and cos(theta_o) of half/difference angles in radians.
-
-    cos_i = cos(theta_h) cos(theta_d) - sin(theta_h) sin(theta_d) cos(phi_d), written as a sum of cos(theta_h + theta_d),
-    taken as the sine of the complement, and a term >= 0, so that nothing cancels up to the horizon.
-    """
-    base = np.sin((np.pi / 2 - theta_h) - theta_d)
-    across = 2 * np.sin(theta_h) * np.sin(theta_d)
-    return base + across * np.sin(phi_d / 2) ** 2, base + across * np.cos(phi_d / 2) ** 2
-
-
-def half_difference(wi: ArrayLike, wo: ArrayLike) -> tuple[np.ndarray, np.ndarray, np.ndarray, np.ndarray]:
-    """Angles ``(theta_h, theta_d, phi_d, phi_h)`` in radians of unit vectors ``[..., 3]``; phi in (-pi, pi].
-
-    The angles of a lobe's centre are exact: theta by arctan2 of a length that does not cancel, never by arccos.
-    """
-    wi, wo = np.broadcast_arrays(np.asarray(wi, float), np.asarray(wo, float))
-    total, difference = wi + wo, wi - wo
-    theta_h = np.arctan2(np.hypot(total[..., 0], total[..., 1]), total[..., 2])
-    theta_d = np.arctan2(np.linalg.norm(difference, axis=-1), np.linalg.norm(total, axis=-1))
-    phi_h = np.arctan2(total[..., 1], total[..., 0])
-    # (l - v)/2 is l without its component along h: turn it back by phi_h and theta_h
-    dx = np.cos(phi_h) * difference[..., 0] + np.sin(phi_h) * difference[..., 1]
-    dy = -np.sin(phi_h) * difference[..., 0] + np.cos(phi_h) * difference[..., 1]
-    x = np.cos(theta_h) * dx - np.sin(theta_h) * difference[..., 2]
-    return theta_h, theta_d, np.arctan2(dy, x), phi_h
-
-
-__all__ = ["Geometry", "directions", "from_directions", "half_difference", "polar_cosines"]
+__all__ = ["Geometry", "from_directions"]

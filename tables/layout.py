@@ -11,7 +11,7 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from ..geometry import directions, polar_cosines
+from ..angles import directions, polar_cosines
 
 Reals = NDArray[np.float64]
 

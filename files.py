@@ -1,0 +1,58 @@
+"""Opening files with their faults in words, and replacing them whole."""
+
+from __future__ import annotations
+
+import os
+import uuid
+from collections.abc import Iterator
+from contextlib import contextmanager
+from io import BufferedReader
+from pathlib import Path
+
+from .errors import InputError
+
+StrPath = str | os.PathLike[str]
+
+
+@contextmanager
+def reading(path: StrPath) -> Iterator[BufferedReader]:
+    """The regular file at ``path``, open for reading bytes.
+
+    Raises InputError if there is none, if it is empty, or if it cannot be opened.
+    """
+    target = Path(path)
+    try:
+        if target.is_dir():
+            raise InputError(f"{path}: is a directory; name a file in it")
+        if target.exists() and not target.is_file():  # opening a pipe would wait for its other end
+            raise InputError(f"{path}: is not a regular file; save it to disk first")
+        file = target.open("rb")
+    except FileNotFoundError:
+        raise InputError(f"{path}: no such file; check the path") from None
+    except OSError as fault:
+        raise InputError(f"{path}: cannot be opened ({fault.strerror or fault}); check path and permissions") from None
+    with file:
+        if os.fstat(file.fileno()).st_size == 0:
+            raise InputError(f"{path}: is empty (0 bytes); copy or download it again")
+        yield file
+
+
+@contextmanager
+def replacing(path: StrPath) -> Iterator[Path]:
+    """A temporary path in the same directory, renamed to ``path`` when the block ends and removed if it fails.
+
+    Raises InputError if the file cannot be written.
+    """
+    target = Path(path)
+    temporary = target.with_name(f".{uuid.uuid4().hex}.tmp")
+    try:
+        yield temporary
+        os.replace(temporary, target)
+    except OSError as fault:
+        why = fault.strerror or fault
+        raise InputError(f"{path}: cannot be written ({why}); check its directory, permissions and free space") from fault
+    finally:
+        temporary.unlink(missing_ok=True)
+
+
+__all__ = ["StrPath", "reading", "replacing"]
