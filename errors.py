@@ -4,7 +4,7 @@ from __future__ import annotations
 
 
 class InputError(ValueError):
-    """A file that cannot be used. The message is one line that names the file, the fault and what to do."""
+    """An input that cannot be used. The message is one line that names the file, the fault and what to do."""
 
     def __init__(self, message: str) -> None:
         super().__init__(" ".join(message.splitlines()))

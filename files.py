@@ -49,7 +49,7 @@ def replacing(path: StrPath) -> Iterator[Path]:
         yield temporary
         os.replace(temporary, target)
     except OSError as fault:
-        why = fault.strerror or fault
+        why = os.strerror(fault.errno) if fault.errno else fault
         raise InputError(f"{path}: cannot be written ({why}); check its directory, permissions and free space") from fault
     finally:
         temporary.unlink(missing_ok=True)

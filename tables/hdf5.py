@@ -81,8 +81,13 @@ def write_hdf5(path: StrPath, values: Table, *, truth: Mapping[str, Any] | None 
 
     Raises InputError if the file cannot be written; nothing is left behind.
     """
-    kind = next(name for name, cls in _KINDS.items() if isinstance(values.layout, cls))
-    with replacing(path) as temporary, h5py.File(temporary, "w") as file:
+    with replacing(path) as temporary:
+        temporary.write_bytes(_image(values, truth))
+
+
+def _image(values: Table, truth: Mapping[str, Any] | None) -> bytes:
+    """The bytes of the file, put together in memory: HDF5 cannot give up cleanly on a disk that fills up."""
+    with h5py.File("table", "w", driver="core", backing_store=False) as file:
         file.attrs.update(format=FORMAT, version=VERSION, material=values.material, angles=values.angles)
         file.attrs.update(source=values.source, source_sha256=values.sha256)
         names = np.array(values.channel_names, object)
@@ -92,11 +97,13 @@ def write_hdf5(path: StrPath, values: Table, *, truth: Mapping[str, Any] | None 
         file.create_dataset("values", data=values.planes).attrs["units"] = "1/sr"
         file.create_dataset("mask", data=values.mask)
         group = file.create_group("layout")
-        group.attrs["kind"] = kind
+        group.attrs["kind"] = next(kind for kind, cls in _KINDS.items() if isinstance(values.layout, cls))
         for f in fields(values.layout):
             data = getattr(values.layout, f.name)
             if data is not None:
                 group.create_dataset(f.name, data=data).attrs["units"] = _UNITS.get(f.name, "rad")
+        file.flush()
+        return bytes(file.id.get_file_image())
 
 
 @contextmanager

@@ -1,0 +1,100 @@
+"""The project's own table file gives back what was written, bit for bit."""
+
+import hashlib
+from dataclasses import fields, replace
+
+import brdfit
+import numpy as np
+import pytest
+from brdfit.tables import HalfDifferenceGrid, Scattered, SphericalGrid, merl_grid, read_hdf5, read_truth, table, write_hdf5
+
+RNG = np.random.default_rng(1)
+
+
+def axis(n, top):
+    edges = np.sort(RNG.random(n + 1)) * top
+    return (edges[:-1] + edges[1:]) / 2, edges
+
+
+def unit(n):
+    v = RNG.normal(size=(n, 3))
+    return v / np.linalg.norm(v, axis=1, keepdims=True)
+
+
+def half_difference(aniso):
+    (th, the), (td, tde), (pd, pde) = axis(3, np.pi / 2), axis(2, np.pi / 2), axis(4, np.pi)
+    ph, phe = axis(5, 2 * np.pi) if aniso else (None, None)
+    return HalfDifferenceGrid(th, td, pd, the, tde, pde, ph, phe)
+
+
+def spherical(aniso):
+    (ti, tie), (to, toe), (po, poe) = axis(3, np.pi / 2), axis(2, np.pi / 2), axis(4, 2 * np.pi)
+    pi, pie = axis(5, 2 * np.pi) if aniso else (None, None)
+    return SphericalGrid(ti, to, po, tie, toe, poe, pi, pie)
+
+
+LAYOUTS = {
+    "merl": merl_grid((3, 2, 4)),
+    "half_difference": half_difference(False),
+    "half_difference_aniso": half_difference(True),
+    "spherical": spherical(False),
+    "spherical_aniso": spherical(True),
+    "scattered": Scattered(unit(7), unit(7), RNG.random(7)),
+    "scattered_isotropic": Scattered(unit(7), unit(7), RNG.random(7), isotropic=True),
+}
+
+
+def bits(a):
+    return np.ascontiguousarray(a).view(np.uint64)
+
+
+@pytest.mark.parametrize("channels", [1, 3, 5])
+@pytest.mark.parametrize("layout", LAYOUTS.values(), ids=LAYOUTS.keys())
+def test_round_trip(tmp_path, layout, channels):
+    planes = RNG.random((channels, *layout.shape)) * 10.0 ** RNG.integers(-300, 300, (channels, *layout.shape))
+    flat = planes.reshape(channels, -1)
+    flat[0, :4] = -1.0, np.nan, np.inf, -0.0
+    names = tuple(f"{400 + 50 * c} nm" for c in range(channels))
+    given = table(planes, layout, "blue métal", source="bench.txt", angles="centre", channel_names=names)
+    left_out = given.mask.copy()
+    left_out.flat[5] = False  # masked for a reason that the values do not tell
+    given = replace(given, mask=left_out)
+    path = tmp_path / "a.h5"
+    brdfit.save(given, path)
+    found = brdfit.load(path)
+    assert list(tmp_path.iterdir()) == [path]
+    np.testing.assert_array_equal(bits(found.planes), bits(given.planes))
+    np.testing.assert_array_equal(found.mask, given.mask)
+    assert (found.material, found.angles, found.channel_names) == ("blue métal", "centre", names)
+    assert (found.source, found.sha256) == (str(path), hashlib.sha256(path.read_bytes()).hexdigest())
+    assert type(found.layout) is type(layout)
+    for f in fields(layout):
+        a, b = getattr(layout, f.name), getattr(found.layout, f.name)
+        if isinstance(a, np.ndarray):
+            np.testing.assert_array_equal(bits(a), bits(b))
+        else:
+            assert a == b
+            assert type(a) is type(b)
+
+
+def test_same_table_same_bytes(tmp_path):
+    given = table(np.ones((1, 3, 2, 4)), LAYOUTS["merl"], "a")
+    brdfit.save(given, tmp_path / "a.h5")
+    brdfit.save(given, tmp_path / "b.h5")
+    assert (tmp_path / "a.h5").read_bytes() == (tmp_path / "b.h5").read_bytes()
+
+
+def test_no_channel_names(tmp_path):
+    write_hdf5(tmp_path / "a.h5", table(np.ones((2, 3, 2, 4)), LAYOUTS["merl"], "a"))
+    assert read_hdf5(tmp_path / "a.h5").channel_names == ()
+
+
+def test_truth(tmp_path):
+    given = table(np.ones((1, 3, 2, 4)), LAYOUTS["merl"], "a")
+    write_hdf5(tmp_path / "a.h5", given)
+    assert read_truth(tmp_path / "a.h5") is None
+    diffuse = RNG.random(3)
+    write_hdf5(tmp_path / "a.h5", given, truth={"model": "ward", "parameters": {"alpha": 0.1, "diffuse": diffuse}})
+    truth = read_truth(tmp_path / "a.h5")
+    assert truth == {"model": "ward", "parameters": {"alpha": 0.1, "diffuse": diffuse.tolist()}}
+    np.testing.assert_array_equal(read_hdf5(tmp_path / "a.h5").planes, given.planes)
