@@ -1,0 +1,335 @@
+"""The figures of a report: line plots as SVG text, images as PNG. The same arrays give the same bytes."""
+
+from __future__ import annotations
+
+import base64
+import io
+import re
+from collections.abc import Sequence
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from .colours import encode, luminance, screen
+from .evidence import Albedo, Lobes, Maps, Sphere
+
+PALETTE = {
+    "gtr": "#0072B2",
+    "abc": "#D55E00",
+    "sgd": "#009E73",
+    "ward": "#CC79A7",
+    "ashikhmin_shirley": "#E69F00",
+    "lambert": "#7F7F7F",
+}
+"""Okabe and Ito's colours, which colour-blind readers can tell apart."""
+
+OTHERS = ("#56B4E9", "#8C564B", "#5D3A9B", "#A6A600", "#0072B2", "#D55E00", "#009E73", "#CC79A7")
+DASHES: tuple[Any, ...] = ("-", (0, (5, 1.5)), (0, (1.5, 1.2)), (0, (6, 1.5, 1.2, 1.5)), (0, (9, 2)))
+MARKERS = "osD^vP*X"
+RGB = ("#B2182B", "#1B7837", "#2166AC")
+
+_STYLE = {
+    "font.size": 8.5,
+    "font.family": "sans-serif",
+    "axes.spines.top": False,
+    "axes.spines.right": False,
+    "axes.linewidth": 0.6,
+    "axes.edgecolor": "#555555",
+    "axes.titlesize": 9,
+    "axes.grid": True,
+    "grid.color": "#e3e3e3",
+    "grid.linewidth": 0.5,
+    "xtick.color": "#333333",
+    "ytick.color": "#333333",
+    "xtick.major.width": 0.5,
+    "ytick.major.width": 0.5,
+    "lines.linewidth": 1.3,
+    "legend.frameon": False,
+    "svg.fonttype": "none",
+    "mathtext.default": "regular",
+}
+
+
+def styles(names: Sequence[str]) -> dict[str, dict[str, Any]]:
+    """Colour, dash and marker for each label; those of the five models are always the same."""
+    spare = iter(OTHERS * (1 + len(names) // len(OTHERS)))
+    return {
+        n: {
+            "color": PALETTE.get(n) or next(spare),
+            "linestyle": DASHES[k % len(DASHES)],
+            "marker": MARKERS[k % len(MARKERS)],
+        }
+        for k, n in enumerate(names)
+    }
+
+
+def _figure(width: float, height: float, rows: int = 1, columns: int = 1, **options: Any) -> tuple[Any, NDArray[Any]]:
+    from matplotlib.backends.backend_agg import FigureCanvasAgg
+    from matplotlib.figure import Figure
+
+    figure = Figure(figsize=(width, height), layout="constrained")
+    FigureCanvasAgg(figure)
+    return figure, figure.subplots(rows, columns, squeeze=False, **options)
+
+
+def _styled(salt: str) -> Any:
+    import matplotlib
+
+    return matplotlib.rc_context({**_STYLE, "svg.hashsalt": salt})
+
+
+def _svg(figure: Any, alt: str) -> str:
+    """The figure as an inline SVG element with a text alternative, without ids that could clash in a page."""
+    out = io.StringIO()
+    figure.savefig(out, format="svg", metadata={"Date": None})
+    text = out.getvalue()
+    text = text[text.index("<svg") :]
+    text = re.sub(r"<metadata>.*?</metadata>", "", text, flags=re.S)
+    text = re.sub(r' id="[A-Za-z0-9]+_\d+"', "", text)
+    text = re.sub(r"<!--.*?-->", "", text, flags=re.S)
+    text = re.sub(r' d="[^"]+"', lambda m: re.sub(r"(\.\d\d)\d+", r"\1", m.group(0)), text)
+    size = re.search(r'viewBox="0 0 ([\d.]+) ([\d.]+)"', text)
+    box = size.group(0) if size else ""
+    head = f'<svg {box} role="img" aria-label="{alt}" xmlns="http://www.w3.org/2000/svg" xmlns:xlink="http://www.w3.org/1999/xlink">'
+    return head + f"<title>{alt}</title>" + text[text.index(">") + 1 :].strip()
+
+
+def lobes(part: Lobes, fits: Sequence[tuple[int, str]], alt: str, salt: str) -> str:
+    """Luminance in the plane of incidence: all of it on a log scale, and the peak on a linear one. ``fits``: (row, label)."""
+    style = styles([label for _, label in fits])
+    columns = len(part.theta_i)
+    with _styled(salt):
+        figure, axes = _figure(10, 4.9, 2, columns, sharey="row" if columns > 1 else False)
+        measured = luminance(part.measured)
+        fitted = luminance(part.fitted)
+        floor = _floor(measured)
+        for k, angle in enumerate(part.theta_i):
+            x = part.theta_o[k]
+            zoom = _window(x, measured[k], angle)
+            for row, ax in enumerate(axes[:, k]):
+                ax.plot(x, measured[k], color="#222222", lw=3.2, alpha=0.28, solid_capstyle="round", label="measured")
+                for m, label in fits:
+                    s = style[label]
+                    ax.plot(x, fitted[m, k], color=s["color"], linestyle=s["linestyle"], label=label, lw=1.2)
+                ax.axvline(angle, color="#999999", lw=0.5, zorder=0)
+                if row == 0:
+                    ax.set_yscale("log")
+                    ax.set_title(f"light at {angle:.3g}°")
+                    ax.set_xlim(-90, 90)
+                    ax.set_xticks([-60, -30, 0, 30, 60])
+                else:
+                    ax.set_xlim(*zoom)
+                    ax.set_xlabel("viewer θ$_o$, degrees")
+        top = np.nanmax(np.where(np.isfinite(measured), measured, np.nan), initial=floor)
+        axes[0, 0].set_ylim(floor, 4 * max(top, np.nanpercentile(fitted[[m for m, _ in fits]], 99.9)))
+        axes[0, 0].set_ylabel("BRDF, 1/sr (log)")
+        axes[1, 0].set_ylim(0, 1.35 * top)
+        axes[1, 0].set_ylabel("BRDF near the peak, 1/sr")
+        handles, labels = axes[0, 0].get_legend_handles_labels()
+        figure.legend(handles, labels, loc="outside upper center", ncols=len(labels), handlelength=3)
+        return _svg(figure, alt)
+
+
+def channels(part: Lobes, row: int, names: Sequence[str], alt: str, salt: str) -> str:
+    """Each channel of one fit in the plane of incidence, log scale."""
+    columns = len(part.theta_i)
+    count = part.measured.shape[-1]
+    colours = RGB if count == 3 else [f"C{c % 10}" for c in range(count)]
+    with _styled(salt):
+        figure, axes = _figure(10, 2.7, 1, columns, sharey="row")
+        for k, angle in enumerate(part.theta_i):
+            ax = axes[0, k]
+            for c in range(count):
+                ax.plot(part.theta_o[k], part.measured[k, :, c], color=colours[c], lw=3.0, alpha=0.28)
+                ax.plot(part.theta_o[k], part.fitted[row, k, :, c], color=colours[c], lw=1.0, label=names[c])
+            ax.set_yscale("log")
+            ax.set_xlim(-90, 90)
+            ax.set_xticks([-60, -30, 0, 30, 60])
+            ax.set_title(f"light at {angle:.3g}°")
+            ax.set_xlabel("viewer θ$_o$, degrees")
+        floor = _floor(part.measured)
+        axes[0, 0].set_ylim(floor, 3 * np.nanmax(np.where(np.isfinite(part.measured), part.measured, np.nan), initial=floor))
+        axes[0, 0].set_ylabel("BRDF, 1/sr (log)")
+        if count <= 8:
+            axes[0, 0].legend(loc="upper left", handlelength=1.2, ncols=1 if count <= 4 else 2)
+        return _svg(figure, alt)
+
+
+def _floor(values: NDArray[Any]) -> float:
+    """Lower end of a log axis: below nearly all measured values."""
+    positive = values[np.isfinite(values) & (values > 0)]
+    return float(np.percentile(positive, 0.5)) / 3 if len(positive) else 1e-4
+
+
+def _window(x: NDArray[Any], y: NDArray[Any], angle: float) -> tuple[float, float]:
+    """Where the peak is on a linear axis: four times the width at half height, at least 1 degree to either side."""
+    near = np.isfinite(y) & (np.abs(x - angle) < 45)
+    if not near.any():
+        return -90.0, 90.0
+    high = x[near & (y > 0.5 * y[near].max())]
+    reach = min(max(2.5 * float(np.ptp(high)), 1.0), 60.0)
+    return max(angle - reach, -90.0), min(angle + reach, 90.0)
+
+
+def maps(part: Maps, fits: Sequence[tuple[int, str]]) -> str:
+    """Signed and RMS residual of each fit over (theta_h, theta_d), as the data URI of a PNG."""
+    import matplotlib
+    from matplotlib import colormaps
+
+    rows = [m for m, _ in fits]
+    known = np.isfinite(part.signed[rows])
+    limit = float(np.percentile(np.abs(part.signed[rows][known]), 98)) if known.any() else 1.0
+    top = float(np.percentile(part.rms[rows][known], 98)) if known.any() else 1.0
+    limit, top = max(limit, 1e-6), max(top, 1e-6)
+    with matplotlib.rc_context({**_STYLE, "axes.grid": False}):
+        figure, axes = _figure(1.75 * max(len(rows), 2) + 1.2, 4.0, 2, len(rows), sharex=True, sharey=True)
+        ticks = np.array([0, 1, 5, 20, 45, 90])
+        for k, (m, label) in enumerate(fits):
+            for ax, data, name, low, high in (
+                (axes[0, k], part.signed[m], "RdBu_r", -limit, limit),
+                (axes[1, k], part.rms[m], "viridis", 0.0, top),
+            ):
+                cmap = colormaps[name].with_extremes(bad="#d8d8d8")
+                image = ax.pcolormesh(
+                    part.theta_d, np.sqrt(part.theta_h), np.ma.masked_invalid(data), cmap=cmap, vmin=low, vmax=high
+                )
+                ax.set_facecolor("#d8d8d8")
+                ax.set_yticks(np.sqrt(ticks), [str(t) for t in ticks])
+                ax.set_xticks([0, 30, 60, 90])
+                if k == len(rows) - 1:
+                    bar = figure.colorbar(image, ax=ax if len(rows) == 1 else axes[0 if ax is axes[0, k] else 1, :], aspect=14)
+                    bar.set_label("mean residual" if ax is axes[0, k] else "RMS residual")
+                    bar.outline.set_linewidth(0.4)
+            axes[0, k].set_title(label)
+            axes[1, k].set_xlabel("θ$_d$, degrees")
+        for ax in axes[:, 0]:
+            ax.set_ylabel("θ$_h$, degrees")
+        out = io.BytesIO()
+        figure.savefig(out, format="png", dpi=150, metadata={"Software": None})
+    return _uri(_quantised(out.getvalue()))
+
+
+def _quantised(png: bytes) -> bytes:
+    """The same picture with 256 colours, at a third of the size."""
+    from PIL import Image
+
+    out = io.BytesIO()
+    Image.open(io.BytesIO(png)).convert("RGB").quantize(256, dither=Image.Dither.NONE).save(out, "PNG", optimize=True)
+    return out.getvalue()
+
+
+def sphere(part: Sphere, values: NDArray[Any]) -> str:
+    """A sphere under the common exposure, data URI. Grey stripes: no measured value. Black: the sphere's own shade."""
+    known = np.isfinite(values).all(-1)
+    code = np.where(known[:, None], encode(np.nan_to_num(screen(values, part.exposure))), 0.0)
+    return _image(part, code, known)
+
+
+def difference(part: Sphere, row: int, top: float) -> str:
+    """The CIEDE2000 difference of one fit, from 0 (dark) to ``top`` and beyond (light), data URI."""
+    from matplotlib import colormaps
+
+    values = part.difference[row]
+    known = np.isfinite(values)
+    return _image(part, colormaps["inferno"](np.clip(np.nan_to_num(values) / top, 0, 1))[:, :3], known)
+
+
+def scale(top: float) -> str:
+    """A colour bar for :func:`difference`, data URI."""
+    from matplotlib import colormaps
+
+    row = colormaps["inferno"](np.linspace(0, 1, 128))[None, :, :3].repeat(8, 0)
+    return _uri(_png(np.round(255 * row).astype(np.uint8)))
+
+
+def _image(part: Sphere, code: NDArray[Any], known: NDArray[Any]) -> str:
+    n = part.lit.shape[0]
+    picture = np.full((n, n, 3), 255, np.uint8)
+    picture[part.lit == 2] = 24
+    y, x = np.nonzero(part.lit == 1)
+    stripes = np.where(((x + y) // 3 % 2)[:, None], 150, 185)
+    picture[y, x] = np.where(known[:, None], np.round(255 * code), stripes).astype(np.uint8)
+    return _uri(_png(picture))
+
+
+def _png(picture: NDArray[np.uint8]) -> bytes:
+    from PIL import Image
+
+    out = io.BytesIO()
+    Image.fromarray(picture).save(out, "PNG", optimize=True)
+    return out.getvalue()
+
+
+def _uri(png: bytes) -> str:
+    return "data:image/png;base64," + base64.b64encode(png).decode()
+
+
+def albedo(part: Albedo, fits: Sequence[tuple[int, str]], alt: str, salt: str) -> str:
+    """Directional albedo, the mean of the channels, over the angle of incidence."""
+    style = styles([label for _, label in fits])
+    with _styled(salt):
+        figure, axes = _figure(5.2, 3.0)
+        ax = axes[0, 0]
+        enough = part.covered > 0.98
+        if enough.any():
+            ax.plot(
+                part.theta_i[enough], part.measured[enough].mean(-1), color="#222222", lw=3.2, alpha=0.28, label="measured"
+            )
+        for m, label in fits:
+            s = style[label]
+            ax.plot(
+                part.theta_i,
+                part.fitted[m].mean(-1),
+                color=s["color"],
+                linestyle=s["linestyle"],
+                marker=s["marker"],
+                ms=3,
+                lw=1.2,
+                label=label,
+            )
+        top = float(np.nanmax(part.fitted[[m for m, _ in fits]].mean(-1), initial=0.1))
+        if top > 0.6:
+            ax.axhline(1, color="#000000", lw=0.8)
+        ax.set_ylim(0, min(max(1.08 * top, 0.02), 3.0))
+        ax.set_xlim(0, 90)
+        ax.set_xticks([0, 15, 30, 45, 60, 75, 90])
+        ax.set_xlabel("light θ$_i$, degrees")
+        ax.set_ylabel("albedo ρ(θ$_i$)")
+        figure.legend(loc="outside right upper", handlelength=2.6)
+        return _svg(figure, alt)
+
+
+def tradeoff(points: Sequence[tuple[str, float, float]], limit: float, alt: str, salt: str) -> str:
+    """Error over the time of the solve; ``points`` are (label, seconds, error)."""
+    style = styles([p[0] for p in points])
+    with _styled(salt):
+        figure, axes = _figure(5.2, 3.0)
+        ax = axes[0, 0]
+        ax.set_xscale("log")
+        ax.set_yscale("log")
+        for label, time, error in points:
+            ax.plot(time, error, marker=style[label]["marker"], color=style[label]["color"], ms=6, lw=0)
+            ax.annotate(label, (time, error), xytext=(6, 3), textcoords="offset points", color="#222222")
+        times, errors = np.array([p[1] for p in points]), np.array([p[2] for p in points])
+        ax.set_xlim(times.min() / 1.6, times.max() * 3.2)
+        ax.set_ylim(min(errors.min(), limit) / 1.5, max(errors.max(), limit) * 1.6)
+        ax.axhline(limit, color="#555555", lw=0.8, ls=(0, (2, 2)))
+        ax.annotate(
+            f"{limit:g}: hardly anyone sees a difference below",
+            (0.99, limit),
+            xycoords=("axes fraction", "data"),
+            ha="right",
+            va="bottom",
+            fontsize=7.5,
+            color="#555555",
+        )
+        from matplotlib.ticker import FuncFormatter, LogLocator, NullFormatter
+
+        for axis in (ax.xaxis, ax.yaxis):
+            axis.set_major_locator(LogLocator(subs=(1, 2, 5)))
+            axis.set_major_formatter(FuncFormatter(lambda v, _: f"{v:g}"))
+            axis.set_minor_formatter(NullFormatter())
+        ax.set_xlabel("solve, seconds")
+        ax.set_ylabel("perceptual error")
+        return _svg(figure, alt)

@@ -1,0 +1,92 @@
+"""The files of a fit: fits.json, and report.html made from it and from evidence.h5."""
+
+from __future__ import annotations
+
+import json
+from collections.abc import Sequence
+from pathlib import Path
+from typing import TYPE_CHECKING, Any
+
+from ..errors import InputError
+from ..files import StrPath, reading, replacing
+from .evidence import Evidence, load_evidence
+from .page import page
+
+if TYPE_CHECKING:
+    from ..fitting.result import Fit
+
+FITS = "fits.json"
+REPORT = "report.html"
+FORMAT = "brdfit-fits"
+VERSION = 1
+
+
+def write_fits(out_dir: StrPath, fits: Sequence[Fit], environment: dict[str, Any]) -> Path:
+    """Write DIR/fits.json. All that says when and where is in ``environment``; the rest follows from the input."""
+    document = {"format": FORMAT, "version": VERSION, "environment": environment, "fits": [f.record() for f in fits]}
+    return _write(Path(out_dir) / FITS, json.dumps(document, indent=1, ensure_ascii=False, allow_nan=False) + "\n")
+
+
+def read_fits(out_dir: StrPath) -> tuple[list[Fit], dict[str, Any]]:
+    """The fits of DIR/fits.json and the environment that they were made in.
+
+    Raises InputError in one line if the file is missing, broken, or of another format or version.
+    """
+    from ..fitting.result import from_record
+
+    path = Path(out_dir) / FITS
+    with reading(path) as file:
+        raw = file.read()
+    try:
+        document = json.loads(raw)
+    except ValueError as fault:
+        raise InputError(f"{path}: is not JSON ({fault}); fit again") from None
+    if not isinstance(document, dict) or document.get("format") != FORMAT:
+        raise InputError(f"{path}: is not a brdfit fits file (its format is not {FORMAT!r}); name a directory that brdfit wrote")
+    if document.get("version") != VERSION:
+        raise InputError(f"{path}: has version {document.get('version')!r}, this brdfit reads {VERSION}; update brdfit or fit again")
+    entries = document.get("fits")
+    if not isinstance(entries, list):
+        raise InputError(f"{path}: holds no list of fits; fit again")
+    fits = []
+    for k, entry in enumerate(entries):
+        try:
+            fits.append(from_record(entry))
+        except KeyError as fault:
+            raise InputError(f"{path}: fit {k} has no {fault}; fit again") from None
+        except (TypeError, ValueError, AttributeError) as fault:
+            raise InputError(f"{path}: fit {k} cannot be read ({fault}); fit again") from None
+    environment = document.get("environment")
+    return fits, environment if isinstance(environment, dict) else {}
+
+
+def write_report(
+    out_dir: StrPath, fits: Sequence[Fit], evidence: Sequence[Evidence], environment: dict[str, Any]
+) -> Path:
+    """Write DIR/report.html: one file that needs no other and no network. The same input gives the same bytes."""
+    from jinja2 import Environment, FileSystemLoader, StrictUndefined
+
+    templates = Environment(
+        loader=FileSystemLoader(Path(__file__).parent),
+        autoescape=True,
+        undefined=StrictUndefined,
+        trim_blocks=True,
+        lstrip_blocks=True,
+    )
+    html = templates.get_template("page.html.j2").render(page(fits, evidence, environment))
+    return _write(Path(out_dir) / REPORT, html)
+
+
+def rebuild_report(out_dir: StrPath) -> Path:
+    """Write DIR/report.html again from DIR/fits.json and, where it is there, DIR/evidence.h5."""
+    fits, environment = read_fits(out_dir)
+    return write_report(out_dir, fits, load_evidence(out_dir), environment)
+
+
+def _write(path: Path, text: str) -> Path:
+    with replacing(path) as temporary:
+        temporary.write_text(text, encoding="utf-8")
+    return path
+
+
+__all__ = ["read_fits", "rebuild_report", "write_fits", "write_report"]
