@@ -1,0 +1,226 @@
+"""Coordinates a fit works in: where each model's valleys are straight and its bounds are a box.
+
+Models know physical parameters only. A chart maps them to coordinates and back, one channel at a time. The plain chart of
+any model takes logarithms where a parameter says so; the models whose plain parameters trade off along curved or infinite
+valleys have a chart of their own (the reason stands at each).
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from dataclasses import dataclass, replace
+from functools import lru_cache
+
+import jax.numpy as jnp
+import numpy as np
+from jaxtyping import Array
+
+from ..models import BRDF, parameters_of
+from ..models.abc import ABC
+from ..models.ashikhmin_shirley import AshikhminShirley, AshikhminShirleyAnisotropic
+from ..models.fresnel import dielectric_f0
+from ..models.gtr import GTR
+from ..models.sgd import SGD
+
+Scalars = dict[str, Array]
+Map = Callable[[Scalars], Scalars]
+
+
+@dataclass(frozen=True)
+class Coordinate:
+    """One coordinate: the parameter it stands for in messages, its box, and whether the BRDF is affine in it."""
+
+    name: str
+    parameter: str
+    per_channel: bool
+    lower: float
+    upper: float
+    linear: bool
+
+
+@dataclass(frozen=True)
+class Chart:
+    """Coordinates of a model and the maps to and from its parameters (for one channel, all scalars)."""
+
+    cls: type[BRDF]
+    coordinates: tuple[Coordinate, ...]
+    to_parameters: Map
+    from_parameters: Map
+
+    @property
+    def channel(self) -> tuple[Coordinate, ...]:
+        """Coordinates that each channel has its own of."""
+        return tuple(c for c in self.coordinates if c.per_channel)
+
+    @property
+    def shared(self) -> tuple[Coordinate, ...]:
+        """Coordinates that all channels share."""
+        return tuple(c for c in self.coordinates if not c.per_channel)
+
+    def vector(self, channels: int) -> list[tuple[Coordinate, int | None]]:
+        """Order of the vector a solver works on: each channel's coordinates, channel by channel, then the shared ones."""
+        own = [(c, k) for k in range(channels) for c in self.channel]
+        return [*own, *((c, None) for c in self.shared)]
+
+    def split(self, x: Array, channels: int) -> tuple[Array, Array]:
+        """``(own [C, K], shared [S])`` of a vector."""
+        k = len(self.channel)
+        return x[: channels * k].reshape(channels, k), x[channels * k :]
+
+    def parameters(self, own: Array, shared: Array) -> Scalars:
+        """Parameters of one channel from its own coordinates ``[K]`` and the shared ones ``[S]``."""
+        values = {c.name: own[i] for i, c in enumerate(self.channel)} | {c.name: shared[i] for i, c in enumerate(self.shared)}
+        return self.to_parameters(values)
+
+    def model(self, own: Array, shared: Array) -> BRDF:
+        """The model of one channel, its parameters scalars."""
+        return self.cls(**self.parameters(own, shared))
+
+    def raw_coordinates(self, parameters: dict[str, np.ndarray], channels: int) -> np.ndarray:
+        """Vector of given parameters (arrays ``[]`` or ``[C]``)."""
+        rows = []
+        for k in range(channels):
+            scalars = {n: jnp.asarray(v if np.ndim(v) == 0 else v[k]) for n, v in parameters.items()}
+            rows.append({n: float(v) for n, v in self.from_parameters(scalars).items()})
+        return np.array([rows[k or 0][c.name] for c, k in self.vector(channels)])
+
+    def coordinates_of(self, parameters: dict[str, np.ndarray], channels: int) -> np.ndarray:
+        """Vector of given parameters, moved into the box where outside."""
+        x = self.raw_coordinates(parameters, channels)
+        lower, upper = self.box(channels)
+        return np.clip(np.nan_to_num(x, nan=0.0, posinf=1e300, neginf=-1e300), lower, upper)
+
+    def box(self, channels: int) -> tuple[np.ndarray, np.ndarray]:
+        """Lower and upper bounds of a vector."""
+        order = self.vector(channels)
+        return np.array([c.lower for c, _ in order]), np.array([c.upper for c, _ in order])
+
+
+def plain_chart(cls: type[BRDF], bounds: tuple[tuple[str, float, float], ...] = ()) -> Chart:
+    """Each parameter its own coordinate, logarithms where it says so; ``bounds`` replace the default search box."""
+    boxes = {name: (lower, upper) for name, lower, upper in bounds}
+    logs = frozenset(p.name for p in parameters_of(cls) if p.log)
+    coordinates = []
+    for p in parameters_of(cls):
+        lower, upper = boxes.get(p.name, p.search)
+        if p.log:
+            # a bound at 0 of a logarithmic coordinate is the smallest number that keeps the formula in range
+            lower, upper = np.log(max(lower, 1e-300)), np.log(upper)
+        coordinates.append(Coordinate(p.name, p.name, p.per_channel, float(lower), float(upper), p.linear))
+
+    def to_parameters(x: Scalars) -> Scalars:
+        return {n: jnp.exp(v) if n in logs else v for n, v in x.items()}
+
+    def from_parameters(p: Scalars) -> Scalars:
+        return {n: jnp.log(v) if n in logs else v for n, v in p.items()}
+
+    return Chart(cls, tuple(coordinates), to_parameters, from_parameters)
+
+
+def _rewritten(
+    chart: Chart, to_parameters: Map, from_parameters: Map, **boxes: tuple[float, float]
+) -> Chart:
+    """A chart with other maps, and another box for the coordinates named."""
+    coordinates = tuple(
+        replace(c, lower=boxes[c.name][0], upper=boxes[c.name][1]) if c.name in boxes else c for c in chart.coordinates
+    )
+    return Chart(chart.cls, coordinates, to_parameters, from_parameters)
+
+
+def _gtr_chart(narrow: bool) -> Chart:
+    """Alpha by the logarithm of |ln alpha^2|, on either side of 1.
+
+    As gamma -> infinity only K = gamma |ln alpha^2| is determined. In (ln alpha, ln gamma) that valley bends
+    exponentially (condition 1e7 to 1e9); in (ln |ln alpha^2|, ln gamma) it is a straight line.
+    """
+    plain = plain_chart(GTR)
+    sign = -0.5 if narrow else 0.5
+    limit = abs(2 * np.log(1e-9 if narrow else 10.0))
+
+    def to_parameters(x: Scalars) -> Scalars:
+        return {**x, "alpha": jnp.exp(sign * jnp.exp(x["alpha"])), "gamma": jnp.exp(x["gamma"])}
+
+    def from_parameters(p: Scalars) -> Scalars:
+        # on the wrong side of 1 the nearest point of this chart is its end at 1
+        size = jnp.maximum(jnp.log(p["alpha"]) / sign, 1e-9)
+        return {**p, "alpha": jnp.log(size), "gamma": jnp.log(p["gamma"])}
+
+    return _rewritten(plain, to_parameters, from_parameters, alpha=(float(np.log(1e-9)), float(np.log(limit))))
+
+
+def _abc_chart() -> Chart:
+    """The lobe's scale by specular F(0), and ior - 1 by its logarithm.
+
+    F(0) runs from 1e-7 to 1 with the index; specular alone would have to run against it by as much.
+    """
+    plain = plain_chart(ABC)
+
+    def to_parameters(x: Scalars) -> Scalars:
+        ior = 1 + jnp.exp(x["ior"])
+        return {
+            "diffuse": x["diffuse"],
+            "specular": x["specular"] / dielectric_f0(ior),
+            "b": jnp.exp(x["b"]),
+            "c": jnp.exp(x["c"]),
+            "ior": ior,
+        }
+
+    def from_parameters(p: Scalars) -> Scalars:
+        return {
+            "diffuse": p["diffuse"],
+            "specular": p["specular"] * dielectric_f0(p["ior"]),
+            "b": jnp.log(p["b"]),
+            "c": jnp.log(p["c"]),
+            "ior": jnp.log(p["ior"] - 1),
+        }
+
+    return _rewritten(plain, to_parameters, from_parameters, ior=(float(np.log(1e-3)), float(np.log(1e3))))
+
+
+def _sgd_chart() -> Chart:
+    """specular f0 and specular f1 in place of f0 and f1: the BRDF is linear in them, and some channels have their optimum
+    at specular -> 0 with specular f0 finite, where f0 is infinite.
+    """
+    plain = plain_chart(SGD)
+
+    def to_parameters(x: Scalars) -> Scalars:
+        s = x["specular"]
+        return {**x, "alpha": jnp.exp(x["alpha"]), "f0": x["f0"] / s, "f1": x["f1"] / s}
+
+    def from_parameters(p: Scalars) -> Scalars:
+        s = p["specular"]
+        return {**p, "alpha": jnp.log(p["alpha"]), "f0": p["f0"] * s, "f1": p["f1"] * s}
+
+    return _rewritten(plain, to_parameters, from_parameters)
+
+
+def _ashikhmin_shirley_chart(cls: type[BRDF]) -> Chart:
+    """Diffuse (1 - specular) in place of diffuse: the BRDF is affine in it, and diffuse is not determined as specular -> 1."""
+    plain = plain_chart(cls)
+
+    def to_parameters(x: Scalars) -> Scalars:
+        p = plain.to_parameters(x)
+        return {**p, "diffuse": x["diffuse"] / (1 - x["specular"])}
+
+    def from_parameters(p: Scalars) -> Scalars:
+        return {**plain.from_parameters(p), "diffuse": p["diffuse"] * (1 - p["specular"])}
+
+    return _rewritten(plain, to_parameters, from_parameters)
+
+
+@lru_cache(maxsize=256)
+def charts(cls: type[BRDF], plain: bool = False, bounds: tuple[tuple[str, float, float], ...] = ()) -> tuple[Chart, ...]:
+    """The charts a fit of ``cls`` searches in, cached so that a second fit finds its program compiled.
+
+    ``plain`` asks for one coordinate a parameter, which held or bounded parameters need.
+    """
+    if not plain and not bounds:
+        if cls is GTR:
+            return (_gtr_chart(narrow=True), _gtr_chart(narrow=False))
+        if cls is ABC:
+            return (_abc_chart(),)
+        if cls is SGD:
+            return (_sgd_chart(),)
+        if cls in (AshikhminShirley, AshikhminShirleyAnisotropic):
+            return (_ashikhmin_shirley_chart(cls),)
+    return (plain_chart(cls, bounds),)

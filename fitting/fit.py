@@ -1,0 +1,261 @@
+"""Fit a model to a table: starts, search, error bars, and the story of how it went."""
+
+from __future__ import annotations
+
+import time
+from collections.abc import Mapping
+from typing import Any
+from weakref import WeakKeyDictionary
+
+import equinox as eqx
+import jax
+import jax.numpy as jnp
+import numpy as np
+from jaxtyping import ArrayLike
+from numpy.typing import NDArray
+
+from ..models import BRDF, parameter_values, parameters_of, variants
+from ..tables import Table
+from .coordinates import Chart, charts
+from .estimate import combine, estimate_of
+from .gram import Problem, loss_errors
+from .losses import LOSSES, Loss, LossFunction, named_loss
+from .result import Fit, Named, Optimum
+from .samples import Samples, samples
+from .search import Found, search
+from .solver import Box
+from .starts import Summary, starts, summarise
+from .timing import compilation
+
+Model = str | BRDF | type[BRDF]
+
+OPTIMAL = 1e-4
+"""Cosine between residual and Jacobian below which a point counts as a first-order optimum: moving there would lower the
+error by less than half the square of it, 5e-9 relative."""
+EXACT = 1e-9
+"""Error below which a fit is exact to rounding."""
+
+_errors = eqx.filter_jit(loss_errors)
+
+_prepared: WeakKeyDictionary[Table, dict[Any, tuple[Samples, NDArray[np.bool_], Summary]]] = WeakKeyDictionary()
+
+
+def prepare(table: Table, max_angle: float, measure: str) -> tuple[Samples, NDArray[np.bool_], Summary]:
+    """Blocks, fitted cells and summary of a table, kept for the next model fitted to it."""
+    kept = _prepared.setdefault(table, {})
+    key = (max_angle, measure)
+    if key not in kept:
+        blocks, used = samples(table, max_angle, measure)
+        kept.clear()
+        kept[key] = blocks, used, summarise(table, used)
+    return kept[key]
+
+
+def model_class(model: Model, anisotropic: bool) -> type[BRDF]:
+    """The class to fit: of a name, its form for the kind of table.
+
+    Raises ValueError for an unknown name, TypeError for what is no model.
+    """
+    if isinstance(model, str):
+        forms = variants(model)
+        return next((f for f in forms if f.anisotropic == anisotropic), forms[0])
+    cls = model if isinstance(model, type) else type(model)
+    if not issubclass(cls, BRDF) or not parameters_of(cls):
+        raise TypeError(f"a model is a name, a BRDF or a BRDF class with declared parameters, not {model!r}")
+    return cls
+
+
+def fit(
+    table: Table,
+    model: Model = "gtr",
+    *,
+    loss: str | Loss | LossFunction = "log",
+    measure: str = "solid_angle",
+    max_angle: float = 80.0,
+    fixed: Mapping[str, ArrayLike] | None = None,
+    bounds: Mapping[str, tuple[float, float]] | None = None,
+    start: Mapping[str, ArrayLike] | None = None,
+    anisotropic: bool | None = None,
+    seed: int = 0,
+) -> Fit:
+    """Fit one model to all cells of one table, in float64.
+
+    Args:
+        table: What was measured.
+        model: A name of ``brdfit.models.MODELS``, a model class, or an instance, whose values are then one more start.
+        loss: A name of ``brdfit.losses.LOSSES`` or any JAX-traceable ``loss(predicted [n, C], measured [n, C], geometry)
+            -> residual``; the sum of weight * residual^2 is minimised.
+        measure: ``"solid_angle"``, a cell counts by its solid angles, or ``"cells"``, every cell counts once.
+        max_angle: Largest polar angle of either direction, degrees, in (0, 90).
+        fixed: Parameters to hold at given values, ``[]`` or ``[C]``.
+        bounds: ``(lower, upper)`` in place of a parameter's default search box.
+        start: Parameters of one more start; those left out take their defaults.
+        anisotropic: Whether to fit the anisotropic form of a named model; by default if the table is anisotropic.
+        seed: Seed of the starts of models that have no shapes of their own to start from.
+
+    Returns:
+        A :class:`Fit`. A fit that failed is a result with ``converged`` False and the ``reason`` in words.
+
+    Raises:
+        ValueError: Unknown model, loss, measure or parameter name, or a value out of range.
+        TypeError: A model or loss that is neither a name nor the right kind of object.
+    """
+    bound_loss = named_loss(loss)
+    cls = model_class(model, (not table.isotropic) if anisotropic is None else anisotropic)
+    fixed = {n: np.asarray(v, float) for n, v in (fixed or {}).items()}
+    given = _given_start(cls, model, start)
+    _check_names(cls, {**fixed, **given, **dict(bounds or {})})
+    begin = time.perf_counter()
+    with jax.enable_x64(True), compilation() as compiled:
+        blocks, used, summary = prepare(table, max_angle, measure)
+        prepared = time.perf_counter()
+        values = table.planes[:, used]
+        bound_loss = bound_loss.bind(values)
+        frame: dict[str, Any] = {
+            "material": table.material,
+            "source": table.source,
+            "sha256": table.sha256,
+            "angles": table.angles,
+            "model_name": getattr(cls, "name", cls.__name__.lower()),
+            "loss": bound_loss.name,
+            "measure": measure,
+            "max_angle": max_angle,
+            "fixed": tuple(fixed),
+            "cells": {"used": int(used.sum()), "masked": int((~table.mask).sum()), "total": int(used.size)},
+        }
+        if not used.any():
+            reason = f"no measured cell has both polar angles within {max_angle:g} degrees: nothing to fit"
+            return _failed(frame, reason, {"load": table.seconds, "prepare": prepared - begin, "compile": 0.0, "solve": 0.0})
+        box = tuple(sorted((n, float(a), float(b)) for n, (a, b) in (bounds or {}).items()))
+        forms = charts(cls, bool(fixed), box)
+        proposals = list(starts(cls, summary, seed))
+        if given:
+            proposals.insert(0, {**proposals[0], **_per_channel(cls, given, table.channels)})
+        proposals = [{**p, **_per_channel(cls, fixed, table.channels)} for p in proposals]
+        found = _search(forms, blocks, bound_loss, proposals, frozenset(fixed))
+        estimate = combine(cls, [estimate_of(f.problem, f.minimum, f.box) for f in found])
+        named = tuple(LOSSES[n].bind(values) for n in LOSSES)
+        if bound_loss.name not in LOSSES:
+            named = (*named, bound_loss)
+        fitted = cls(**estimate.parameters)
+        errors = np.asarray(_errors(fitted, blocks, named))
+    converged, reason = _verdict(found)
+    solve = time.perf_counter() - prepared - compiled.seconds
+    return Fit(
+        **frame,
+        **vars(estimate),
+        model=fitted,
+        converged=converged,
+        reason=reason,
+        errors={e.name: float(v) for e, v in zip(named, errors, strict=True)},
+        seconds={
+            "load": table.seconds,
+            "prepare": prepared - begin,
+            "compile": compiled.seconds,
+            "solve": max(solve, 0.0),
+        },
+        starts=found[0].starts,
+        optima=_scaled(found, float(errors[[e.name for e in named].index(bound_loss.name)])),
+        passes=max(f.passes for f in found),
+    )
+
+
+def _search(
+    forms: tuple[Chart, ...], blocks: Samples, loss: Loss, proposals: list[Named], fixed: frozenset[str]
+) -> list[Found]:
+    """Best optimum of the whole problem, or of each channel where nothing ties the channels together."""
+    channels = blocks.measured.shape[1]
+    apart = loss.separable and not forms[0].shared and channels > 1
+    found = []
+    for part in [[c] for c in range(channels)] if apart else [list(range(channels))]:
+        cells = blocks.channel(part[0]) if apart else blocks
+        problems = []
+        for chart in forms:
+            lower, upper = chart.box(len(part))
+            free = [c.parameter not in fixed for c, _ in chart.vector(len(part))]
+            begin = [chart.coordinates_of({n: v if v.ndim == 0 else v[part] for n, v in p.items()}, len(part)) for p in proposals]
+            box = Box(jnp.asarray(lower), jnp.asarray(upper), jnp.asarray(free))
+            if fixed:  # a held parameter may lie outside the box that a fit searches
+                held = ~np.asarray(free)
+                exact = np.array([_unclipped(chart, p, part) for p in proposals])
+                begin = [np.where(held, e, b) for e, b in zip(exact, begin, strict=True)]
+                box = Box(
+                    jnp.where(held, jnp.minimum(box.lower, begin[0]), box.lower),
+                    jnp.where(held, jnp.maximum(box.upper, begin[0]), box.upper),
+                    box.free,
+                )
+            problems.append((Problem(cells, loss, chart), box, begin))
+        found.append(search(problems))
+    return found
+
+
+def _unclipped(chart: Chart, parameters: Named, part: list[int]) -> NDArray[np.float64]:
+    return chart.raw_coordinates({n: v if v.ndim == 0 else v[part] for n, v in parameters.items()}, len(part))
+
+
+def _scaled(found: list[Found], error: float) -> tuple[Optimum, ...]:
+    """Distinct optima with their costs turned into errors of the loss; of the channel with most optima, if apart."""
+    optima = max((f.optima for f in found), key=len)
+    best = optima[0].error or 1.0
+    return tuple(Optimum(o.error / best * error, o.starts) for o in optima)
+
+
+def _given_start(cls: type[BRDF], model: Model, start: Mapping[str, ArrayLike] | None) -> Named:
+    given = dict(parameter_values(model)) if isinstance(model, BRDF) else {}
+    return given | {n: np.asarray(v, float) for n, v in (start or {}).items()}
+
+
+def _check_names(cls: type[BRDF], values: Mapping[str, Any]) -> None:
+    known = [p.name for p in parameters_of(cls)]
+    for name in values:
+        if name not in known:
+            raise ValueError(f"{cls.__name__} has no parameter {name!r}: it has {', '.join(known)}")
+
+
+def _per_channel(cls: type[BRDF], values: Named, channels: int) -> Named:
+    """Given values as arrays ``[C]`` or ``[]``, as each parameter is. Raises ValueError if one does not fit."""
+    out = {}
+    for p in parameters_of(cls):
+        if p.name not in values:
+            continue
+        v = values[p.name]
+        for x in v.ravel():
+            if x not in p.valid:
+                raise ValueError(f"{cls.__name__}: parameter {p.name!r} must lie in {p.valid}, not {x:g}")
+        try:
+            out[p.name] = np.broadcast_to(v, (channels,) if p.per_channel else ()).copy()
+        except ValueError:
+            wanted = f"a scalar or {channels} values" if p.per_channel else "a scalar"
+            raise ValueError(f"{cls.__name__}: parameter {p.name!r} is {wanted}, not of shape {list(v.shape)}") from None
+    return out
+
+
+def _verdict(found: list[Found]) -> tuple[bool, str]:
+    """Whether the fit converged, and why it stopped, in words; the worst channel speaks for all."""
+    worst = max(found, key=lambda f: (not bool(f.minimum.stopped), float(f.minimum.optimality)))
+    end = worst.minimum
+    error, cosine, steps = float(np.sqrt(end.cost)), float(end.optimality), int(end.steps)
+    if not np.isfinite(error) or error > 1e140:
+        return False, "no start gave a finite error: the model is not defined where the data are"
+    if error < EXACT:
+        return True, f"exact fit: the error is {error:.1g}, which is rounding"
+    if not bool(end.stopped):
+        return False, f"stopped at the limit of {steps} steps; the gradient is still {cosine:.1g} (cosine to the residual)"
+    if cosine > OPTIMAL:
+        return False, f"stalled after {steps} steps: no step lowers the error, but the gradient is {cosine:.1g}, not 0"
+    return True, f"at a minimum: the last step changed the cost by less than 1e-9 of itself, gradient {cosine:.1g}"
+
+
+def _failed(frame: dict[str, Any], reason: str, seconds: dict[str, float]) -> Fit:
+    return Fit(
+        **frame,
+        model=None,
+        parameters={},
+        stderr={},
+        spread={},
+        covariance={},
+        converged=False,
+        reason=reason,
+        errors={n: float("nan") for n in LOSSES},
+        seconds=seconds,
+    )

@@ -1,0 +1,235 @@
+"""The Gram residual: a table of a million cells as a least-squares problem of a handful of rows.
+
+One pass over the blocks accumulates G = [J r]^T [J r], (n+1) x (n+1). With any factor U^T U = G the residual z = U[:, n]
+with Jacobian U[:, :n] has z^T z = r^T r, Jz^T Jz = J^T J and Jz^T z = J^T r exactly, so that every solver of the
+Gauss-Newton family works on it unchanged, and memory does not grow with the table.
+
+Where the loss treats channels separately, G falls into one small matrix a channel (own and shared coordinates).
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from typing import Any
+
+import equinox as eqx
+import jax
+import jax.numpy as jnp
+import numpy as np
+from jaxtyping import Array, Float
+
+from ..geometry import Geometry
+from ..models import evaluate_channels
+from .coordinates import Chart
+from .losses import Loss
+from .samples import Samples
+
+Vector = Float[Array, "n"]
+
+
+class Problem(eqx.Module):
+    """Everything that is minimised: data, loss and chart. The data is an argument of the compiled program, so that a
+    second table of the same shape finds it compiled.
+    """
+
+    samples: Samples
+    loss: Loss
+    chart: Chart = eqx.field(static=True)
+
+    @property
+    def channels(self) -> int:
+        """Number of channels C."""
+        return self.samples.measured.shape[1]
+
+    @property
+    def size(self) -> int:
+        """Length n of the vector of coordinates."""
+        return self.channels * len(self.chart.channel) + len(self.chart.shared)
+
+
+def _columns(function: Callable[[Vector], Array], x: Vector) -> tuple[list[Array], Array]:
+    """Columns of the Jacobian, one forward derivative each, and the value.
+
+    Each derivative is taken with the other coordinates held, so that what they do not touch is absent from its program;
+    the value is computed once, as the compiler finds the copies equal.
+    """
+    columns = []
+    value = None
+    for k in range(x.size):
+
+        def along(t: Array, k: int = k) -> Array:
+            return function(jnp.stack([t if i == k else x[i] for i in range(x.size)]))
+
+        value, tangent = jax.jvp(along, (x[k],), (jnp.ones((), x.dtype),))
+        columns.append(tangent)
+    return columns, function(x) if value is None else value
+
+
+def _root_weight(loss: Loss, g: Geometry, weight: Array) -> Array:
+    relative = loss.weight(g)
+    return jnp.sqrt(weight if relative is None else weight * relative)
+
+
+def channel_rows(problem: Problem, x: Vector, g: Geometry, measured: Array, weight: Array) -> Float[Array, "C k+s+1 *cells"]:
+    """Weighted rows [J r] of a block, channel by channel, for a loss that treats channels separately."""
+    chart, loss = problem.chart, problem.loss
+    own, shared = chart.split(x, problem.channels)
+    root = _root_weight(loss, g, weight)
+    k = len(chart.channel)
+
+    def one(own_c: Vector, measured_c: Array) -> Array:
+        def residual(y: Vector) -> Array:
+            f = jnp.broadcast_to(chart.model(y[:k], y[k:]).evaluate(g), measured_c.shape)
+            return root * loss(f[..., None], measured_c[..., None], g)[..., 0]
+
+        columns, value = _columns(residual, jnp.concatenate([own_c, shared]))
+        return jnp.stack([*(jnp.broadcast_to(c, value.shape) for c in columns), value])
+
+    return jax.vmap(one)(own, measured)
+
+
+def joint_rows(problem: Problem, x: Vector, g: Geometry, measured: Array, weight: Array) -> Float[Array, "n+1 m *cells"]:
+    """Weighted rows [J r] of a block for a loss of any form, m residuals a cell."""
+    chart, loss = problem.chart, problem.loss
+    cells = weight.shape
+    flat = g.flat()
+    root = _root_weight(loss, flat, weight.reshape(-1))
+    m = jnp.moveaxis(measured, 0, -1).reshape(-1, problem.channels)
+
+    def residual(y: Vector) -> Array:
+        own, shared = chart.split(y, problem.channels)
+        f = jax.vmap(lambda o: jnp.broadcast_to(chart.model(o, shared).evaluate(g), cells), out_axes=-1)(own)
+        r = loss(f.reshape(-1, problem.channels), m, flat)
+        r = jnp.asarray(r).reshape(root.size, -1)
+        return jnp.moveaxis(root[:, None] * r, -1, 0).reshape(-1, *cells)
+
+    columns, value = _columns(residual, x)
+    return jnp.stack([*columns, value])
+
+
+def _products(rows: Float[Array, "m *cells"]) -> Float[Array, "m m"]:
+    """Rows times rows, summed over the cells."""
+    r = rows.reshape(rows.shape[0], -1)
+    return r @ r.T
+
+
+def _band_products(rows: Float[Array, "m *cells"], samples: Samples) -> Float[Array, "*bands m m"]:
+    """Rows times rows, summed over the cells of each angular band."""
+    m, shape = rows.shape[0], samples.banded
+    within = [a for a in range(len(shape)) if a not in samples.band_axes]
+    r = rows.reshape(m, *shape).transpose(*(a + 1 for a in samples.band_axes), 0, *(a + 1 for a in within))
+    r = r.reshape(*(shape[a] for a in samples.band_axes), m, -1)
+    return r @ jnp.swapaxes(r, -1, -2)
+
+
+def _scatter(problem: Problem, per_channel: Float[Array, "C ... k k"]) -> Float[Array, "... n+1 n+1"]:
+    """The full Gram matrix from those of the channels."""
+    n, k, c = problem.size, len(problem.chart.channel), problem.channels
+    tail = np.arange(c * k, n + 1)
+    out = jnp.zeros((*per_channel.shape[1:-2], n + 1, n + 1))
+    for i in range(c):
+        at = np.concatenate([np.arange(i * k, (i + 1) * k), tail])
+        out = out.at[..., at[:, None], at].add(per_channel[i])
+    return out
+
+
+def _sum_over_blocks(samples: Samples, blocks: Array | int, one: Callable[[Geometry, Array, Array], Any]) -> Any:
+    """Sum of ``one(geometry, measured, weight)``, a pytree of arrays, over the first ``blocks`` blocks."""
+
+    def step(i: Array, total: Any) -> Any:
+        return jax.tree.map(jnp.add, total, one(*samples.block(i)))
+
+    shapes = jax.eval_shape(lambda: one(*samples.block(jnp.zeros((), int))))
+    return jax.lax.fori_loop(0, blocks, step, jax.tree.map(lambda s: jnp.zeros(s.shape, s.dtype), shapes))
+
+
+def gram(problem: Problem, x: Vector, blocks: Array) -> Float[Array, "n+1 n+1"]:
+    """G = [J r]^T [J r] over the first ``blocks`` blocks; its last element is the cost."""
+
+    def one(g: Geometry, measured: Array, weight: Array) -> Array:
+        if problem.loss.separable:
+            return jax.vmap(_products)(channel_rows(problem, x, g, measured, weight))
+        return _products(joint_rows(problem, x, g, measured, weight))
+
+    total: Array = _sum_over_blocks(problem.samples, blocks, one)
+    return _scatter(problem, total) if problem.loss.separable else total
+
+
+def statistics(problem: Problem, x: Vector) -> tuple[Float[Array, "... n+1 n+1"], Float[Array, "n n"]]:
+    """What error bars are made of: G of each angular band, and the sum over cells of s s^T.
+
+    s = sum_c w r J is the gradient of a cell (the middle of the sandwich, White 1980, eq. 3). The channels of a cell are
+    summed first, so that noise which they share is counted.
+    """
+    n, k, c = problem.size, len(problem.chart.channel), problem.channels
+
+    def one(g: Geometry, measured: Array, weight: Array) -> tuple[Array, Array]:
+        if problem.loss.separable:
+            rows = channel_rows(problem, x, g, measured, weight)
+            s = (rows[:, :-1] * rows[:, -1:]).reshape(c, rows.shape[1] - 1, -1)
+            s = jnp.concatenate([s[:, :k].reshape(c * k, -1), jnp.sum(s[:, k:], 0)])
+            return jax.vmap(lambda r: _band_products(r, problem.samples))(rows), s @ s.T
+        rows = joint_rows(problem, x, g, measured, weight)
+        s = jnp.sum(rows[:-1] * rows[-1:], 1).reshape(n, -1)
+        return jnp.sum(jax.vmap(lambda r: _band_products(r, problem.samples), in_axes=1)(rows), 0), s @ s.T
+
+    grams, middle = _sum_over_blocks(problem.samples, problem.samples.blocks, one)
+    return (_scatter(problem, grams) if problem.loss.separable else grams), middle
+
+
+def factor(g: Float[Array, "m m"]) -> Float[Array, "m m"]:
+    """U with U^T U = g, for any symmetric positive semidefinite g, singular ones too.
+
+    By eigenvalues of the matrix scaled to unit diagonal: a Cholesky factor does not exist where a parameter has no effect
+    (tests/test_gram.py::test_singular_gram). Eigenvalues below zero are rounding.
+    """
+    diagonal = jnp.diag(g)
+    scale = jnp.sqrt(jnp.where(diagonal > 0, diagonal, 1.0))
+    values, vectors = jnp.linalg.eigh(g / scale[:, None] / scale)
+    return jnp.sqrt(jnp.maximum(values, 0.0))[:, None] * vectors.T * scale
+
+
+def gram_residual(problem: Problem, blocks: Array) -> Callable[[Vector], Array]:
+    """The table as a residual of n + 1 rows with an exact Jacobian.
+
+    A trial point where the residual is not a number (1 + f cos <= 0 under ``log``) has infinite cost: it is rejected, and
+    the factors of a finite matrix are returned in its place so that no NaN reaches the solver.
+    """
+
+    def whiten(x: Vector) -> Array:
+        g = gram(problem, x, blocks)
+        ok = jnp.all(jnp.isfinite(g))
+        g = jnp.where(ok, g, jnp.eye(g.shape[0]))
+        return jnp.where(ok, 1.0, 1e150) * factor(g)
+
+    @jax.custom_jvp
+    def residual(x: Vector) -> Array:
+        return whiten(x)[:, -1]
+
+    @residual.defjvp
+    def _(primals: tuple[Any], tangents: tuple[Any]) -> tuple[Array, Array]:
+        u = whiten(primals[0])
+        return u[:, -1], u[:, :-1] @ tangents[0]
+
+    return residual
+
+
+def loss_errors(model: Any, samples: Samples, losses: tuple[Loss, ...]) -> Float[Array, "losses"]:
+    """sqrt(sum w r^2 / sum w) of each loss over all fitted cells and channels."""
+
+    def one(g: Geometry, measured: Array, weight: Array) -> Array:
+        f = evaluate_channels(model, g)
+        m = jnp.moveaxis(measured, 0, -1)
+        out = []
+        for loss in losses:
+            relative = loss.weight(g)
+            w = jnp.broadcast_to(weight if relative is None else weight * relative, weight.shape).reshape(-1, 1)
+            if loss.separable:
+                r = loss(f, m, g).reshape(w.size, -1)
+            else:
+                r = jnp.asarray(loss(f.reshape(-1, f.shape[-1]), m.reshape(-1, f.shape[-1]), g.flat())).reshape(w.size, -1)
+            out.append(jnp.stack([jnp.sum(w * r**2), jnp.sum(w) * r.shape[-1]]))
+        return jnp.stack(out)
+
+    sums = _sum_over_blocks(samples, samples.blocks, one)
+    return jnp.sqrt(sums[:, 0] / sums[:, 1])

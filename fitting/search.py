@@ -1,0 +1,121 @@
+"""From many starts to the best optimum: colours first, then everything on a coarse table, then the whole one."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import equinox as eqx
+import jax.numpy as jnp
+import numpy as np
+from jaxtyping import Array
+from numpy.typing import NDArray
+
+from .gram import Problem, gram_residual
+from .result import Optimum
+from .solver import Box, Minimum, minimise
+
+COLOUR_BLOCKS = 2
+"""Blocks of the table for refitting the linear coordinates alone."""
+COARSE_BLOCKS = 6
+"""Blocks of the table for polishing the best shapes."""
+POLISHED = 6
+"""Starts that are polished on the coarse table, in each chart."""
+FINISHED = 3
+"""Distinct optima of the coarse table that are carried to the whole one, at most."""
+SAME = 1e-3
+"""Relative difference of cost below which two starts count as having reached the same optimum."""
+WORTH = 1.3
+"""An optimum of the coarse table is carried on if its cost is below this multiple of the best one's."""
+MAX_STEPS = 300
+
+
+class Stage(eqx.Module):
+    """How much of the table a search looks at, when it stops, and how careful its first step is."""
+
+    blocks: Array
+    rtol: Array
+    damping: Array
+
+    @staticmethod
+    def of(blocks: int, rtol: float, damping: float) -> Stage:
+        """A stage, its numbers as arguments of the compiled program."""
+        return Stage(jnp.asarray(blocks), jnp.asarray(rtol), jnp.asarray(damping))
+
+
+@eqx.filter_jit
+def solve(problem: Problem, x: Array, box: Box, stage: Stage) -> Minimum:
+    """Minimise from x. One program for coarse and whole tables and for any bounds."""
+    return minimise(gram_residual(problem, stage.blocks), x, box, stage.rtol, stage.damping, MAX_STEPS)
+
+
+@dataclass(frozen=True)
+class Found:
+    """The best optimum and what else there was."""
+
+    problem: Problem
+    box: Box
+    minimum: Minimum
+    starts: int
+    optima: tuple[Optimum, ...]
+    passes: int
+
+
+def _finite(cost: float) -> float:
+    return cost if np.isfinite(cost) and cost < 1e290 else np.inf
+
+
+def search(problems: list[tuple[Problem, Box, list[NDArray[np.float64]]]]) -> Found:
+    """Best optimum over problems that differ in their chart only, each with a box and starts in its coordinates.
+
+    Every start gets its linear coordinates refitted on a coarse table; the best shapes are then polished there, all
+    coordinates free, and the distinct optima among them on the whole table.
+    """
+    total = problems[0][0].samples.blocks
+    colour = Stage.of(min(total, COLOUR_BLOCKS), 1e-2, 1e-2)
+    coarse = Stage.of(min(total, COARSE_BLOCKS), 1e-6, 1.0)
+    whole = Stage.of(total, 1e-9, 1e-5)
+    polished: list[tuple[float, Problem, Box, Minimum]] = []
+    tried = 0
+    for problem, box, starts in problems:
+        tried += len(starts)
+        linear = jnp.asarray([c.linear for c, _ in problem.chart.vector(problem.channels)])
+        colours = Box(box.lower, box.upper, box.free & linear)
+        ranked = [solve(problem, jnp.asarray(x), colours, colour) for x in starts]
+        ranked.sort(key=lambda m: _finite(float(m.cost)))
+        for start in ranked[:POLISHED]:
+            m = solve(problem, start.x, box, coarse)
+            polished.append((_finite(float(m.cost)), problem, box, m))
+    polished.sort(key=lambda p: p[0])
+    distinct: list[tuple[float, Problem, Box, Minimum]] = []
+    counts: list[int] = []
+    for candidate in polished:
+        cost = candidate[0]
+        if distinct and cost <= distinct[-1][0] * (1 + SAME):
+            counts[-1] += 1
+        else:
+            distinct.append(candidate)
+            counts.append(1)
+    finished = []
+    passes = 0
+    for (cost, problem, box, m), count in zip(distinct[:FINISHED], counts, strict=False):
+        if finished and not cost <= WORTH * distinct[0][0]:
+            continue
+        end = solve(problem, m.x, box, whole)
+        passes += int(end.steps)
+        finished.append((_finite(float(end.cost)), count, problem, box, end))
+    finished.sort(key=lambda f: f[0])
+    optima = [Optimum(float(np.sqrt(cost)), count) for cost, count, *_ in finished]
+    optima += [Optimum(float(np.sqrt(d[0])), n) for d, n in list(zip(distinct, counts, strict=True))[len(finished) :]]
+    _, _, problem, box, best = finished[0]
+    return Found(problem, box, best, tried, _merged(optima), passes)
+
+
+def _merged(optima: list[Optimum]) -> tuple[Optimum, ...]:
+    """Optima of one error counted together, best first."""
+    merged: list[Optimum] = []
+    for o in sorted(optima, key=lambda o: o.error):
+        if merged and o.error <= merged[-1].error * (1 + SAME / 2):
+            merged[-1] = Optimum(merged[-1].error, merged[-1].starts + o.starts)
+        else:
+            merged.append(o)
+    return tuple(merged)

@@ -1,0 +1,146 @@
+"""Levenberg-Marquardt in a box, assembled from Optimistix' parts.
+
+Optimistix has no bounds for least squares, damps every parameter alike and spends its last steps at round-off. Here a
+descent of our own damps by the column norms of the Jacobian (Marquardt 1963) and projects onto the box with an active
+set; the trust region is the library's; and the solver stops when an accepted step no longer pays.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from typing import Any
+
+import equinox as eqx
+import jax.numpy as jnp
+import optimistix as optx
+from jaxtyping import Array, Bool, Float
+
+Vector = Float[Array, "n"]
+
+
+class Box(eqx.Module):
+    """Bounds of a vector, and which of its elements may move at all."""
+
+    lower: Vector
+    upper: Vector
+    free: Bool[Array, "n"]
+
+
+class _State(eqx.Module):
+    y: Vector
+    gradient: Vector
+    matrix: Float[Array, "n n"]
+    scale: Vector
+
+
+class BoxDescent(optx.AbstractDescent):  # type: ignore[misc]
+    """Damped Gauss-Newton step in a box: elements at a bound that the gradient pushes outwards are held, and elements
+    that the step would carry out of the box stop at its wall while the others are solved for again.
+    """
+
+    box: Box
+    damping: Array | float = 1.0
+    """Damping of the first step, relative to the unit diagonal: 1 far from an optimum, little close to one."""
+
+    def init(self, y: Vector, f_info_struct: Any) -> _State:
+        """State before the first step."""
+        n = y.size
+        return _State(y, jnp.zeros(n), jnp.eye(n), jnp.ones(n))
+
+    def query(self, y: Vector, f_info: Any, state: _State) -> _State:
+        """Normal equations at y, scaled to unit diagonal."""
+        jac = f_info.jac.as_matrix()
+        gradient, matrix = jac.T @ f_info.residual, jac.T @ jac
+        diagonal = jnp.diag(matrix)
+        # Guard: a parameter without any effect has a zero column; it gets scale 1 and stays where it is.
+        scale = jnp.sqrt(jnp.where(diagonal > 0, diagonal, 1.0))
+        return _State(y, gradient / scale, matrix / scale[:, None] / scale, scale)
+
+    def step(self, step_size: Array, state: _State) -> tuple[Vector, optx.RESULTS]:
+        """Step for damping 1/step_size."""
+        lower, upper = (self.box.lower - state.y) * state.scale, (self.box.upper - state.y) * state.scale
+        damping = jnp.maximum(self.damping / step_size, 1e-14)
+        outward = ((lower >= 0) & (state.gradient > 0)) | ((upper <= 0) & (state.gradient < 0))
+        held = ~self.box.free | outward
+        at = jnp.zeros_like(state.y)
+        for _ in range(3):
+            moving = ~held
+            both = moving[:, None] & moving
+            a = jnp.where(both, state.matrix, 0.0) + jnp.diag(jnp.where(moving, damping, 1.0))
+            rhs = jnp.where(moving, -(state.gradient + state.matrix @ jnp.where(held, at, 0.0)), at)
+            d = jnp.linalg.solve(a, rhs)
+            clipped = jnp.clip(d, lower, upper)
+            at = jnp.where(moving & (clipped != d), clipped, at)
+            held = held | (clipped != d)
+        d = jnp.where(self.box.free, jnp.clip(d, lower, upper), 0.0)
+        y = jnp.clip(state.y + d / state.scale, self.box.lower, self.box.upper)  # lands on the bound itself, to the bit
+        return jnp.where(self.box.free, y - state.y, 0.0), optx.RESULTS.successful
+
+
+class BoxLevenbergMarquardt(optx.AbstractGaussNewton):  # type: ignore[misc]
+    """Levenberg-Marquardt that stops on what matters: ``rtol`` is the relative decrease of the cost that still counts.
+
+    Successful when an accepted, hardly damped step lowers the cost by less than ``rtol`` relative, or when ``patience``
+    steps in a row were rejected (the cost is flat to rounding).
+    """
+
+    rtol: Array | float
+    atol: float
+    norm: Callable[[Any], Array]
+    descent: BoxDescent
+    search: optx.ClassicalTrustRegion
+    verbose: Callable[..., None]
+    patience: int
+
+    def __init__(self, box: Box, rtol: Array | float, damping: Array | float = 1.0, patience: int = 10) -> None:
+        self.rtol = rtol
+        self.atol = 0.0
+        self.norm = optx.max_norm
+        self.descent = BoxDescent(box, damping)
+        self.search = optx.ClassicalTrustRegion(high_cutoff=0.75, low_cutoff=0.01, high_constant=10.0, low_constant=0.1)
+        self.verbose = lambda **_: None
+        self.patience = patience
+
+    def step(self, fn: Any, y: Vector, args: Any, options: Any, state: Any, tags: Any) -> Any:
+        """One step of Gauss-Newton, then the test whether to stop."""
+        new_y, new, aux = optx.AbstractGaussNewton.step(self, fn, y, args, options, state, tags)
+        before, after = jnp.sum(state.f_info.residual**2), jnp.sum(new.f_info.residual**2)
+        accepted = new.num_steps_since_acceptance == 0
+        damped = self.descent.damping > 1e-2 * new.search_state.step_size
+        stalled = accepted & ~state.first_step & ~damped & (before - after <= self.rtol * before)
+        hopeless = new.num_steps_since_acceptance >= self.patience
+        return new_y, eqx.tree_at(lambda s: s.terminate, new, stalled | hopeless | (after == 0)), aux
+
+
+class Minimum(eqx.Module):
+    """Where a solver stopped."""
+
+    x: Vector
+    cost: Array
+    """|residual|^2."""
+    optimality: Array
+    """Distance from a first-order optimum of the boxed problem: the largest cosine between the residual and a column of
+    the Jacobian that may still move, in [0, 1]; 0 for an exact fit."""
+    steps: Array
+    stopped: Array
+    """Whether it stopped by itself, not by the limit of steps."""
+
+
+def minimise(residual: Callable[[Vector], Array], x: Vector, box: Box, rtol: Array, damping: Array, max_steps: int) -> Minimum:
+    """Minimise |residual(x)|^2 over a box, from an x inside it."""
+    solver = BoxLevenbergMarquardt(box, rtol, damping)
+    solution = optx.least_squares(lambda y, _: residual(y), solver, x, max_steps=max_steps, throw=False)
+    end = solution.state.f_info
+    columns = end.jac.as_matrix()
+    gradient, cost = columns.T @ end.residual, jnp.sum(end.residual**2)
+    x = solution.value
+    outward = ((x <= box.lower) & (gradient > 0)) | ((x >= box.upper) & (gradient < 0))
+    size = jnp.sum(columns**2, 0) * cost
+    moves = box.free & ~outward & (size > 0)
+    cosine = jnp.where(moves, jnp.abs(gradient) / jnp.sqrt(jnp.where(moves, size, 1.0)), 0.0)
+    return Minimum(
+        x, cost, jnp.max(cosine, initial=0.0), solution.stats["num_steps"], solution.result == optx.RESULTS.successful
+    )
+
+
+__all__ = ["Box", "BoxDescent", "BoxLevenbergMarquardt", "Minimum", "minimise"]

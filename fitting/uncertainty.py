@@ -1,0 +1,70 @@
+"""How sure the parameters are: two answers, because on a million cells the noise is never what limits.
+
+``stderr`` is statistical: the sandwich H^-1 M H^-1 (White 1980) with H = J^T W J and M the sum of squared cell gradients,
+right when the noise varies over the table, if it is independent from cell to cell. ``spread`` is a delete-one-block
+jackknife over bands of (theta_h, theta_d): it sees whatever a model that cannot reproduce the table trades off between
+angles. Each deletion takes one Gauss-Newton step from the optimum, with the bounds that are active held.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+Reals = NDArray[np.float64]
+
+SINGULAR = 1e-11
+"""Eigenvalue of the unit-diagonal J^T W J, relative to the largest, below which a direction is not determined: the Gram
+matrix is a sum of squares accurate to about 1e-13 of its diagonal."""
+
+
+@dataclass(frozen=True)
+class Uncertainty:
+    """Covariance matrices in coordinates; rows of coordinates that are held are 0."""
+
+    statistical: Reals
+    jackknife: Reals
+    undetermined: NDArray[np.bool_]
+    """Coordinates that the data do not determine."""
+
+
+def uncertainty(bands: Reals, middle: Reals, moving: NDArray[np.bool_]) -> Uncertainty:
+    """From Gram matrices of the bands ``[B, n+1, n+1]``, the sandwich's middle ``[n, n]`` and which coordinates move."""
+    n = middle.shape[0]
+    total = bands.sum(0)
+    undetermined = np.zeros(n, bool)
+    statistical, jackknife = np.zeros((n, n)), np.zeros((n, n))
+    moving = moving & np.isfinite(total).all(0)[:n]
+    undetermined |= moving & ~(np.diag(total)[:n] > 0)
+    at = np.flatnonzero(moving & ~undetermined)
+    if not len(at):
+        return Uncertainty(statistical, jackknife, undetermined)
+    inverse, null = _pseudo_inverse(total[np.ix_(at, at)])
+    undetermined[at] = null
+    statistical[np.ix_(at, at)] = inverse @ middle[np.ix_(at, at)] @ inverse
+    used = bands[bands[:, :n, :n].trace(axis1=1, axis2=2) > 0]
+    steps = np.stack([_delete(total - band, at) for band in used]) if len(used) > 1 else np.zeros((1, len(at)))
+    deviation = steps - steps.mean(0)
+    count = len(steps)
+    jackknife[np.ix_(at, at)] = (count - 1) / count * deviation.T @ deviation
+    return Uncertainty(statistical, jackknife, undetermined)
+
+
+def _delete(rest: Reals, at: NDArray[np.int64]) -> Reals:
+    """Gauss-Newton step to the optimum of the cells that are left."""
+    inverse, _ = _pseudo_inverse(rest[np.ix_(at, at)])
+    step: Reals = -inverse @ rest[at, -1]
+    return step
+
+
+def _pseudo_inverse(matrix: Reals) -> tuple[Reals, NDArray[np.bool_]]:
+    """Inverse on the directions that are determined, and which rows take part in one that is not."""
+    diagonal = np.diag(matrix)
+    scale = np.sqrt(np.where(diagonal > 0, diagonal, 1.0))
+    values, vectors = np.linalg.eigh(matrix / scale[:, None] / scale)
+    null = values < SINGULAR * values[-1]
+    kept = vectors[:, ~null]
+    inverse = (kept / values[~null]) @ kept.T / scale[:, None] / scale
+    return inverse, (vectors[:, null] ** 2).sum(1) > 0.05
