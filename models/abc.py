@@ -34,9 +34,7 @@ class ABC(BRDF):
     )
     b: Float[Array, ""] = parameter("inverse width of the lobe", valid=POSITIVE, search=(1e-2, 1e9), default=100, log=True)
     c: Float[Array, ""] = parameter("fall-off of the tail", valid=NOT_NEGATIVE, search=(1e-3, 1e4), default=1, log=True)
-    ior: Float[Array, ""] = parameter(
-        "index of refraction", valid=Interval(1, open_lower=True), search=(1.001, 1001), default=1.5, log=True
-    )
+    ior: Float[Array, ""] = parameter("index of refraction", valid=Interval(1), search=(1.001, 1001), default=1.5, log=True)
 
     def evaluate(self, g: Geometry) -> Float[Array, "..."]:
         """Value in 1/sr."""

@@ -47,7 +47,7 @@ class AshikhminShirley(BRDF):
 
     def evaluate(self, g: Geometry) -> Float[Array, "..."]:
         """Value in 1/sr."""
-        d = ndf.power_cosine(g.sin2_h, self.exponent)
+        d = ndf.power_cosine(g.sin2_h, g.cos2_h, self.exponent)
         lobe = schlick(self.specular, g) * (d / (4 * g.cos_d * jnp.maximum(g.cos_i, g.cos_o)))
         return ashikhmin_shirley_body(self.diffuse, self.specular, g) + lobe
 
@@ -68,6 +68,6 @@ class AshikhminShirleyAnisotropic(BRDF):
 
     def evaluate(self, g: Geometry) -> Float[Array, "..."]:
         """Value in 1/sr."""
-        d = ndf.power_cosine_anisotropic(*g.tangential(), self.exponent_x, self.exponent_y)
+        d = ndf.power_cosine_anisotropic(*g.tangential(), g.cos2_h, self.exponent_x, self.exponent_y)
         lobe = schlick(self.specular, g) * (d / (4 * g.cos_d * jnp.maximum(g.cos_i, g.cos_o)))
         return ashikhmin_shirley_body(self.diffuse, self.specular, g) + lobe

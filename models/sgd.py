@@ -34,9 +34,7 @@ class SGD(BRDF):
     alpha: Float[Array, "C"] = parameter(
         "lobe width (mean square slope)", per_channel=True, valid=POSITIVE, search=(1e-7, 30), default=0.1, log=True
     )
-    p: Float[Array, "C"] = parameter(
-        "fall-off of the tail", per_channel=True, valid=REAL, search=(-10, 60), default=0.5
-    )
+    p: Float[Array, "C"] = parameter("fall-off of the tail", per_channel=True, valid=REAL, search=(-10, 60), default=0.5)
     f0: Float[Array, "C"] = parameter("Fresnel constant", per_channel=True, linear=True, valid=REAL, default=0.04)
     f1: Float[Array, "C"] = parameter("Fresnel linear term", per_channel=True, linear=True, valid=REAL, default=0.0)
 

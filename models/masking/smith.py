@@ -10,7 +10,10 @@ from jaxtyping import Array, Float
 from ...geometry import Geometry
 from ...quadrature import smith_kernel
 
-NODES = 64
+NODES = 140
+REACH = 28.0
+"""Range of u of the quadrature: ln(2 tan(theta)) is 10 at 89.995 degrees, and u - 10 = 18 holds densities that change
+within e^-10 of the horizon. A density that needs less says so as ``smith_reach``, which sets the nodes closer."""
 
 NDF = Callable[[Float[Array, "..."], Float[Array, "..."]], Float[Array, "..."]]
 
@@ -24,9 +27,13 @@ def smith_lambda(ndf: NDF, cosine: Float[Array, "..."]) -> Float[Array, "..."]:
 
     every factor of which is positive: nothing cancels. With c = cos(theta), s = sin(theta),
     sin^2(theta_m) = c^2/(c^2 + s^2 cos^2 t), so that no tangent is formed and normal incidence is regular.
+
+    Error of G1, up to 89.995 degrees: 1e-9 for GTR with alpha 1e-9..10 and gamma 0.01..1e7 (Gaussian lobes; 1e-15 for
+    gamma < 10), 1e-9 for SGD with alpha 1e-7..30 and p -10..60 (tests/test_masking.py::test_against_the_projected_area).
     """
     cosine = jnp.asarray(cosine)
-    cos2_t, weight = (jnp.asarray(a, cosine.dtype) for a in smith_kernel(NODES))
+    rule = smith_kernel(NODES, getattr(ndf, "smith_reach", REACH))
+    cos2_t, weight = (jnp.asarray(a, cosine.dtype) for a in rule)
     c2 = (cosine * cosine)[..., None]
     s2 = (1 - cosine)[..., None] * (1 + cosine)[..., None]
     norm = c2 + s2 * cos2_t

@@ -31,5 +31,6 @@ class ABC(eqx.Module):
         return 1 / (2 * jnp.pi / self.b * length * jnp.sum(weight * (1 - s) * jnp.exp((1 - self.c) * w)))
 
     def __call__(self, sin2: Float[Array, "..."], cos2: Float[Array, "..."]) -> Float[Array, "..."]:
+        """D in 1/sr."""
         vers = sin2 / (1 + jnp.sqrt(cos2))
         return self.normalisation() * jnp.exp(-self.c * jnp.log1p(self.b * vers))

@@ -24,6 +24,7 @@ class GTR(eqx.Module):
     gamma: Float[Array, ""]
 
     def __call__(self, sin2: Float[Array, "..."], cos2: Float[Array, "..."]) -> Float[Array, "..."]:
+        """D in 1/sr."""
         log_alpha2 = 2 * jnp.log(self.alpha)
         narrow = log_alpha2 <= 0
         m = jnp.where(narrow, -log_alpha2, log_alpha2)  # not abs: its derivative at alpha = 1 would be 0

@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from typing import ClassVar
+
 import equinox as eqx
 import jax
 import jax.numpy as jnp
@@ -14,31 +16,47 @@ class SGD(eqx.Module):
     """D = exp(-x) / (x^p alpha Gamma(1 - p, alpha) pi (n.m)^4),  x = alpha + tan^2(theta_m)/alpha.
 
     ``alpha`` > 0 is the width (the mean square slope of the Gaussian it tends to for p = 0), any real ``p`` the shape of
-    the tail. Gamma(s, x) is the upper incomplete gamma function, needed here for s = 1 - p <= 0 too. With t = alpha e^u,
+    the tail. Gamma(s, x) is the upper incomplete gamma function, needed here for s = 1 - p <= 0 too. With t = m e^u,
 
-        alpha Gamma(1 - p, alpha) x^p e^x = alpha^2 (1 + tan^2/alpha^2)^p e^(tan^2/alpha) I,
-        I = int_0^inf exp((1 - p) u - alpha (e^u - 1)) du,
+        Gamma(s, alpha) = m^s e^(-m) I,   I = int_ln(alpha/m)^inf exp(s u - m (e^u - 1)) du,
+        D = exp(m - x) (m/x)^p / (pi alpha m I (n.m)^4),
 
-    which neither over- nor underflows; I takes 128 Gauss-Legendre nodes over the range where the integrand is above
-    1e-17 of its peak.
+    for any m > 0. At m = max(alpha, s) the integrand peaks at u = 0 with value 1, so that nothing over- or underflows.
     """
 
     alpha: Float[Array, ""]
     p: Float[Array, ""]
 
+    smith_reach: ClassVar[float] = 15.0
+    """See :func:`brdfit.models.masking.smith_lambda`: exp(-tan^2/alpha) ends the integral long before the horizon."""
+
+    def reference(self) -> Float[Array, ""]:
+        """m."""
+        return jnp.maximum(self.alpha, 1 - self.p)
+
     def integral(self) -> Float[Array, ""]:
-        """I = e^alpha alpha^(p-1) Gamma(1 - p, alpha)."""
+        """I, by 128 Gauss-Legendre nodes over the range where the integrand is above e^-45 of its peak."""
         x, weight = (jnp.asarray(a, jnp.result_type(self.alpha)) for a in gauss_legendre(128))
-        s = 1 - self.p
-        # The end of the range is no part of the answer: no derivative goes through it.
-        alpha, rate = jax.lax.stop_gradient((self.alpha, -s))
-        growth = jnp.maximum(-rate, 0)
-        end = jnp.log1p((45 + 3 * growth * jnp.log1p(growth + 1 / alpha)) / alpha)
-        end = jnp.where(rate > 1, jnp.minimum(end, 45 / jnp.maximum(rate, 1)), end)
-        u = x * end
-        return end * jnp.sum(weight * jnp.exp(s * u - self.alpha * jnp.expm1(u)))
+        s, m = 1 - self.p, self.reference()
+        # Where the range is cut is no part of the answer: no derivative goes through it.
+        rate, scale = jax.lax.stop_gradient((s, m))
+        end = jnp.minimum(jnp.log(_tail(scale, 45) / scale), 45 / jnp.maximum(-rate, 0.1))
+        start = jnp.maximum(jnp.log(self.alpha / m), -1 - 45 / jnp.maximum(rate, 0.1))
+        u = start + x * (end - start)
+        return (end - start) * jnp.sum(weight * jnp.exp(s * u - m * jnp.expm1(u)))
 
     def __call__(self, sin2: Float[Array, "..."], cos2: Float[Array, "..."]) -> Float[Array, "..."]:
-        tan2 = sin2 / cos2
-        log = -tan2 / self.alpha - self.p * jnp.log1p(tan2 / self.alpha**2) + 2 * jnp.log1p(tan2)
-        return jnp.exp(log) / (jnp.pi * self.alpha**2 * self.integral())
+        """D in 1/sr."""
+        m = self.reference()
+        # Guard: towards the horizon D falls below the smallest number while x and 1/cos^4 grow beyond the largest one,
+        # and 0 * inf = NaN (tests/test_ndf.py::test_sgd_at_the_horizon).
+        lost = sin2 > jax.lax.stop_gradient(self.alpha * _tail(m, 1000)) * cos2
+        sin2, cos2 = jnp.where(lost, 0, sin2), jnp.where(lost, 1, cos2)
+        x = self.alpha + sin2 / cos2 / self.alpha
+        d = jnp.exp(m - x - self.p * jnp.log(x / m)) / (jnp.pi * self.alpha * m * self.integral() * cos2**2)
+        return jnp.where(lost, 0, d)
+
+
+def _tail(m: Float[Array, ""], a: float) -> Float[Array, ""]:
+    """A bound on where m ln(t/m) - (t - m) falls to -a: t = m + sqrt(2 a m) + a, since d - ln(1 + d) >= a/m there."""
+    return m + jnp.sqrt(2 * a * m) + a
