@@ -21,7 +21,7 @@ import jax.numpy as jnp
 import numpy as np
 from jaxtyping import Array, ArrayLike, Float
 
-from .polar import PolarStencil
+from .polar import PolarStencil, PolarTables
 
 Field = Float[Array, "..."]
 
@@ -48,6 +48,9 @@ class Geometry(eqx.Module):
     stencil_i: PolarStencil | None = None
     """Where theta_i lies on a table of polar angles; None to evaluate functions of it directly."""
     stencil_o: PolarStencil | None = None
+
+    tables: PolarTables | None = eqx.field(static=True, default=None)
+    """Tables of polar angles made beforehand; None to make them where they are asked for."""
 
     @property
     def shape(self) -> tuple[int, ...]:
@@ -104,7 +107,8 @@ class Geometry(eqx.Module):
         """``function(cos(theta))`` at theta_i and theta_o: through the table of polar angles where there is one."""
         if self.stencil_i is None or self.stencil_o is None:
             return function(self.cos_i), function(self.cos_o)
-        nodes = self.stencil_i.tabulate(function)
+        stencil = self.stencil_i
+        nodes = stencil.tabulate(function) if self.tables is None else self.tables.get(lambda: stencil.tabulate(function))
         return self.stencil_i.interpolate(nodes), self.stencil_o.interpolate(nodes)
 
     def tangential(self) -> tuple[Field, Field]:

@@ -38,6 +38,27 @@ def _tables(max_angle: float, dtype: str) -> tuple[np.ndarray, np.ndarray]:
     return np.cos((x + 1) / 2 * max_angle).astype(dtype), matrix.astype(dtype)
 
 
+class PolarTables:
+    """Tables of polar functions made before the cells are visited.
+
+    A program that runs over a table block by block would make them anew in every block. Built with none, it notes the
+    tables a model asks for, in ``made``; built with those, it hands them out again in the same order.
+    """
+
+    def __init__(self, made: list[Array] | None = None) -> None:
+        self.replay = made is not None
+        self.made: list[Array] = list(made or [])
+        self._next = 0
+
+    def get(self, make: Callable[[], Array]) -> Array:
+        """The next table: made now, or as it was made before."""
+        if not self.replay:
+            self.made.append(make())
+            return self.made[-1]
+        self._next += 1
+        return self.made[self._next - 1]
+
+
 class PolarStencil(eqx.Module):
     """Positions of polar angles on a uniform table over [0, ``max_angle``] radians."""
 

@@ -184,6 +184,7 @@ def _search(
                     jnp.where(held, jnp.maximum(box.upper, begin[0]), box.upper),
                     box.free,
                 )
+            begin = [x for i, x in enumerate(begin) if not any(np.array_equal(x, y) for y in begin[:i])]
             problems.append((Problem(cells, loss, chart), box, begin))
         found.append(search(problems))
     return found
@@ -243,7 +244,7 @@ def _verdict(found: list[Found]) -> tuple[bool, str]:
         return False, f"stopped at the limit of {steps} steps; the gradient is still {cosine:.1g} (cosine to the residual)"
     if cosine > OPTIMAL:
         return False, f"stalled after {steps} steps: no step lowers the error, but the gradient is {cosine:.1g}, not 0"
-    return True, f"at a minimum: the last step changed the cost by less than 1e-9 of itself, gradient {cosine:.1g}"
+    return True, f"at a minimum: the last step changed the cost by less than 1e-8 of itself, gradient {cosine:.1g}"
 
 
 def _failed(frame: dict[str, Any], reason: str, seconds: dict[str, float]) -> Fit:

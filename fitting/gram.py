@@ -10,6 +10,7 @@ Where the loss treats channels separately, G falls into one small matrix a chann
 from __future__ import annotations
 
 from collections.abc import Callable
+from dataclasses import replace
 from typing import Any
 
 import equinox as eqx
@@ -20,6 +21,7 @@ from jaxtyping import Array, Float
 
 from ..geometry import Geometry
 from ..models import evaluate_channels
+from ..polar import PolarTables
 from .coordinates import Chart
 from .losses import Loss
 from .samples import Samples
@@ -70,35 +72,92 @@ def _root_weight(loss: Loss, g: Geometry, weight: Array) -> Array:
     return jnp.sqrt(weight if relative is None else weight * relative)
 
 
-def channel_rows(problem: Problem, x: Vector, g: Geometry, measured: Array, weight: Array) -> Float[Array, "C k+s+1 *cells"]:
+class _Tables(eqx.Module):
+    """Functions of one polar angle that a model asks for, at coordinates x, with their derivatives.
+
+    They depend on the coordinates alone, so they are made once a pass. In a block they enter as their first-order
+    expansions about x, which is all that a Jacobian at x needs; coordinates that the BRDF is affine in have no part in
+    them.
+    """
+
+    x: Vector
+    values: list[Array]
+    slopes: list[Array]
+
+    def near(self, y: Vector, curved: list[int]) -> PolarTables:
+        """The tables at y, to first order in the coordinates that bend the model."""
+        step = [y[i] - self.x[i] for i in curved]
+        tables = zip(self.values, self.slopes, strict=True)
+        return PolarTables([v + sum(d * s[:, i] for d, i in zip(step, curved, strict=True)) for v, s in tables])
+
+
+def _curved(chart: Chart) -> list[int]:
+    """Positions, in a channel's coordinates followed by the shared ones, of those that the BRDF is not affine in."""
+    return [i for i, c in enumerate((*chart.channel, *chart.shared)) if not c.linear]
+
+
+def polar_tables(problem: Problem, x: Vector) -> _Tables:
+    """Polar functions of every channel's model, all leaves with a leading axis ``[C]``."""
+    chart = problem.chart
+    own, shared = chart.split(x, problem.channels)
+    k = len(chart.channel)
+    g, _, _ = problem.samples.block(jnp.zeros((), int))
+
+    def make(y: Vector) -> list[Array]:
+        tables = PolarTables()
+        chart.model(y[:k], y[k:]).evaluate(replace(g, tables=tables))
+        return tables.made
+
+    def one(own_c: Vector) -> _Tables:
+        y = jnp.concatenate([own_c, shared])
+        return _Tables(y, make(y), jax.jacfwd(make)(y))
+
+    return jax.vmap(one)(own)
+
+
+def channel_rows(
+    problem: Problem, x: Vector, tables: _Tables, g: Geometry, measured: Array, weight: Array
+) -> Float[Array, "C k+s+1 *cells"]:
     """Weighted rows [J r] of a block, channel by channel, for a loss that treats channels separately."""
     chart, loss = problem.chart, problem.loss
     own, shared = chart.split(x, problem.channels)
     root = _root_weight(loss, g, weight)
     k = len(chart.channel)
+    curved = _curved(chart)
 
-    def one(own_c: Vector, measured_c: Array) -> Array:
+    def one(own_c: Vector, tables_c: _Tables, measured_c: Array) -> Array:
         def residual(y: Vector) -> Array:
-            f = jnp.broadcast_to(chart.model(y[:k], y[k:]).evaluate(g), measured_c.shape)
+            at = replace(g, tables=tables_c.near(y, curved))
+            f = jnp.broadcast_to(chart.model(y[:k], y[k:]).evaluate(at), measured_c.shape)
             return root * loss(f[..., None], measured_c[..., None], g)[..., 0]
 
         columns, value = _columns(residual, jnp.concatenate([own_c, shared]))
         return jnp.stack([*(jnp.broadcast_to(c, value.shape) for c in columns), value])
 
-    return jax.vmap(one)(own, measured)
+    return jax.vmap(one)(own, tables, measured)
 
 
-def joint_rows(problem: Problem, x: Vector, g: Geometry, measured: Array, weight: Array) -> Float[Array, "n+1 m *cells"]:
+def joint_rows(
+    problem: Problem, x: Vector, tables: _Tables, g: Geometry, measured: Array, weight: Array
+) -> Float[Array, "n+1 m *cells"]:
     """Weighted rows [J r] of a block for a loss of any form, m residuals a cell."""
     chart, loss = problem.chart, problem.loss
     cells = weight.shape
     flat = g.flat()
     root = _root_weight(loss, flat, weight.reshape(-1))
     m = jnp.moveaxis(measured, 0, -1).reshape(-1, problem.channels)
+    k = len(chart.channel)
+    curved = _curved(chart)
 
     def residual(y: Vector) -> Array:
         own, shared = chart.split(y, problem.channels)
-        f = jax.vmap(lambda o: jnp.broadcast_to(chart.model(o, shared).evaluate(g), cells), out_axes=-1)(own)
+
+        def one(own_c: Vector, tables_c: _Tables) -> Array:
+            z = jnp.concatenate([own_c, shared])
+            f = chart.model(z[:k], z[k:]).evaluate(replace(g, tables=tables_c.near(z, curved)))
+            return jnp.broadcast_to(f, cells)
+
+        f = jax.vmap(one, out_axes=-1)(own, tables)
         r = loss(f.reshape(-1, problem.channels), m, flat)
         r = jnp.asarray(r).reshape(root.size, -1)
         return jnp.moveaxis(root[:, None] * r, -1, 0).reshape(-1, *cells)
@@ -145,11 +204,12 @@ def _sum_over_blocks(samples: Samples, blocks: Array | int, one: Callable[[Geome
 
 def gram(problem: Problem, x: Vector, blocks: Array) -> Float[Array, "n+1 n+1"]:
     """G = [J r]^T [J r] over the first ``blocks`` blocks; its last element is the cost."""
+    tables = polar_tables(problem, x)
 
     def one(g: Geometry, measured: Array, weight: Array) -> Array:
         if problem.loss.separable:
-            return jax.vmap(_products)(channel_rows(problem, x, g, measured, weight))
-        return _products(joint_rows(problem, x, g, measured, weight))
+            return jax.vmap(_products)(channel_rows(problem, x, tables, g, measured, weight))
+        return _products(joint_rows(problem, x, tables, g, measured, weight))
 
     total: Array = _sum_over_blocks(problem.samples, blocks, one)
     return _scatter(problem, total) if problem.loss.separable else total
@@ -162,14 +222,15 @@ def statistics(problem: Problem, x: Vector) -> tuple[Float[Array, "... n+1 n+1"]
     summed first, so that noise which they share is counted.
     """
     n, k, c = problem.size, len(problem.chart.channel), problem.channels
+    tables = polar_tables(problem, x)
 
     def one(g: Geometry, measured: Array, weight: Array) -> tuple[Array, Array]:
         if problem.loss.separable:
-            rows = channel_rows(problem, x, g, measured, weight)
+            rows = channel_rows(problem, x, tables, g, measured, weight)
             s = (rows[:, :-1] * rows[:, -1:]).reshape(c, rows.shape[1] - 1, -1)
             s = jnp.concatenate([s[:, :k].reshape(c * k, -1), jnp.sum(s[:, k:], 0)])
             return jax.vmap(lambda r: _band_products(r, problem.samples))(rows), s @ s.T
-        rows = joint_rows(problem, x, g, measured, weight)
+        rows = joint_rows(problem, x, tables, g, measured, weight)
         s = jnp.sum(rows[:-1] * rows[-1:], 1).reshape(n, -1)
         return jnp.sum(jax.vmap(lambda r: _band_products(r, problem.samples), in_axes=1)(rows), 0), s @ s.T
 

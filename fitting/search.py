@@ -73,7 +73,7 @@ def search(problems: list[tuple[Problem, Box, list[NDArray[np.float64]]]]) -> Fo
     total = problems[0][0].samples.blocks
     colour = Stage.of(min(total, COLOUR_BLOCKS), 1e-2, 1e-2)
     coarse = Stage.of(min(total, COARSE_BLOCKS), 1e-6, 1.0)
-    whole = Stage.of(total, 1e-9, 1e-5)
+    whole = Stage.of(total, 1e-8, 1e-6)
     polished: list[tuple[float, Problem, Box, Minimum]] = []
     tried = 0
     for problem, box, starts in problems:
