@@ -6,6 +6,12 @@ from typing import TYPE_CHECKING, Any
 
 if TYPE_CHECKING:
     from .errors import InputError as InputError
+    from .fitting import Fit as Fit
+    from .fitting import Loss as Loss
+    from .fitting import evaluate as evaluate
+    from .fitting import fit as fit
+    from .fitting import fit_many as fit_many
+    from .geometry import Geometry as Geometry
     from .models import BRDF as BRDF
     from .models import model as model
     from .models import parameter as parameter
@@ -19,8 +25,14 @@ __version__ = "0.1.0"
 # file do not wait for JAX.
 _PUBLIC = {
     "BRDF": "models",
+    "Fit": "fitting",
+    "Geometry": "geometry",
     "InputError": "errors",
     "Table": "tables",
+    "Loss": "fitting",
+    "evaluate": "fitting",
+    "fit": "fitting",
+    "fit_many": "fitting",
     "load": "tables",
     "model": "models",
     "parameter": "models",

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import threading
 import time
 from collections.abc import Mapping
 from typing import Any
@@ -14,7 +15,7 @@ import numpy as np
 from jaxtyping import ArrayLike
 from numpy.typing import NDArray
 
-from ..models import BRDF, parameter_values, parameters_of, variants
+from ..models import BRDF, channels, parameter_values, parameters_of, variants
 from ..tables import Table
 from .coordinates import Chart, charts
 from .estimate import combine, estimate_of
@@ -40,15 +41,19 @@ _errors = eqx.filter_jit(loss_errors)
 _prepared: WeakKeyDictionary[Table, dict[Any, tuple[Samples, NDArray[np.bool_], Summary]]] = WeakKeyDictionary()
 
 
+_preparing = threading.Lock()
+
+
 def prepare(table: Table, max_angle: float, measure: str) -> tuple[Samples, NDArray[np.bool_], Summary]:
     """Blocks, fitted cells and summary of a table, kept for the next model fitted to it."""
-    kept = _prepared.setdefault(table, {})
     key = (max_angle, measure)
-    if key not in kept:
-        blocks, used = samples(table, max_angle, measure)
-        kept.clear()
-        kept[key] = blocks, used, summarise(table, used)
-    return kept[key]
+    with jax.enable_x64(True), _preparing:
+        kept = _prepared.setdefault(table, {})
+        if key not in kept:
+            blocks, used = samples(table, max_angle, measure)
+            kept.clear()
+            kept[key] = blocks, used, summarise(table, used)
+        return kept[key]
 
 
 def model_class(model: Model, anisotropic: bool) -> type[BRDF]:
@@ -125,7 +130,7 @@ def fit(
         }
         if not used.any():
             reason = f"no measured cell has both polar angles within {max_angle:g} degrees: nothing to fit"
-            return _failed(frame, reason, {"load": table.seconds, "prepare": prepared - begin, "compile": 0.0, "solve": 0.0})
+            return _nothing(frame, reason, {"load": table.seconds, "prepare": prepared - begin, "compile": 0.0, "solve": 0.0})
         box = tuple(sorted((n, float(a), float(b)) for n, (a, b) in (bounds or {}).items()))
         forms = charts(cls, bool(fixed), box)
         proposals = list(starts(cls, summary, seed))
@@ -134,9 +139,7 @@ def fit(
         proposals = [{**p, **_per_channel(cls, fixed, table.channels)} for p in proposals]
         found = _search(forms, blocks, bound_loss, proposals, frozenset(fixed))
         estimate = combine(cls, [estimate_of(f.problem, f.minimum, f.box) for f in found])
-        named = tuple(LOSSES[n].bind(values) for n in LOSSES)
-        if bound_loss.name not in LOSSES:
-            named = (*named, bound_loss)
+        named = _named_losses(values, bound_loss)
         fitted = cls(**estimate.parameters)
         errors = np.asarray(_errors(fitted, blocks, named))
     converged, reason = _verdict(found)
@@ -158,6 +161,31 @@ def fit(
         optima=_scaled(found, float(errors[[e.name for e in named].index(bound_loss.name)])),
         passes=max(f.passes for f in found),
     )
+
+
+def evaluate(
+    table: Table, model: BRDF, *, measure: str = "solid_angle", max_angle: float = 80.0, loss: LossFunction | None = None
+) -> dict[str, float]:
+    """Error of any model on a table under every named loss, as fits report it, without fitting anything.
+
+    sqrt(sum w r^2 / sum w) over the cells with both polar angles at most ``max_angle`` degrees and all channels; with
+    ``loss`` also under a loss of your own. Use it to see how a published fit or another tool's result does.
+
+    Raises ValueError if the model has neither one channel nor as many as the table.
+    """
+    if channels(model) not in (1, table.channels):
+        raise ValueError(f"the model has {channels(model)} channels and the table {table.channels}")
+    with jax.enable_x64(True):
+        blocks, used, _ = prepare(table, max_angle, measure)
+        named = _named_losses(table.planes[:, used], None if loss is None else named_loss(loss))
+        values = np.asarray(_errors(model, blocks, named))
+    return {e.name: float(v) for e, v in zip(named, values, strict=True)}
+
+
+def _named_losses(values: NDArray[np.float64], own: Loss | None) -> tuple[Loss, ...]:
+    """Every named loss, ready for these measured values, and one's own where it is not among them."""
+    named = tuple(loss.bind(values) for loss in LOSSES.values())
+    return named if own is None or own.name in LOSSES else (*named, own.bind(values))
 
 
 def _search(
@@ -247,7 +275,24 @@ def _verdict(found: list[Found]) -> tuple[bool, str]:
     return True, f"at a minimum: the last step changed the cost by less than 1e-8 of itself, gradient {cosine:.1g}"
 
 
-def _failed(frame: dict[str, Any], reason: str, seconds: dict[str, float]) -> Fit:
+def failed(material: str, model: Model, reason: str, options: Mapping[str, Any]) -> Fit:
+    """The result of a fit that could not even begin."""
+    cls = model_class(model, anisotropic=False)
+    frame = {
+        "material": material,
+        "source": "",
+        "sha256": "",
+        "angles": "",
+        "model_name": getattr(cls, "name", cls.__name__.lower()),
+        "loss": named_loss(options.get("loss", "log")).name,
+        "measure": options.get("measure", "solid_angle"),
+        "max_angle": options.get("max_angle", 80.0),
+        "cells": {"used": 0, "masked": 0, "total": 0},
+    }
+    return _nothing(frame, reason, dict.fromkeys(("load", "prepare", "compile", "solve"), 0.0))
+
+
+def _nothing(frame: dict[str, Any], reason: str, seconds: dict[str, float]) -> Fit:
     return Fit(
         **frame,
         model=None,

@@ -1,0 +1,67 @@
+"""Every model with its parameters, and every loss, as data and as text."""
+
+from __future__ import annotations
+
+import math
+from typing import Any
+
+from .fitting.losses import LOSSES
+from .models import MODELS, parameters_of
+from .references import REFERENCES
+
+
+def catalogue() -> dict[str, Any]:
+    """Models and losses as JSON values; an end of a range that is infinite is null."""
+    return {
+        "models": [
+            {
+                "name": name,
+                "anisotropic": cls.anisotropic,
+                "description": " ".join((cls.__doc__ or "").split()),
+                "references": [REFERENCES[key] for key in cls.references],
+                "parameters": [
+                    {
+                        "name": p.name,
+                        "meaning": p.meaning,
+                        "unit": p.unit,
+                        "per_channel": p.per_channel,
+                        "range": [_end(p.valid.lower), _end(p.valid.upper)],
+                        "search": [_end(p.search[0]), _end(p.search[1])],
+                        "default": p.default,
+                    }
+                    for p in parameters_of(cls)
+                ],
+            }
+            for name, forms in MODELS.items()
+            for cls in forms
+        ],
+        "losses": [{"name": loss.name, "source": REFERENCES.get(loss.source, loss.source)} for loss in LOSSES.values()],
+    }
+
+
+def text() -> str:
+    """The catalogue for a terminal."""
+    lines = []
+    for name, forms in MODELS.items():
+        for cls in forms:
+            lines += [f"{name}{' (anisotropic)' if cls.anisotropic else ''}", *_wrapped(cls.__doc__ or "")]
+            for p in parameters_of(cls):
+                shape = "per channel" if p.per_channel else "shared"
+                searched = f"searched [{p.search[0]:g}, {p.search[1]:g}]"
+                lines.append(f"    {p.name:12s} {p.meaning}; unit {p.unit}, {shape}, range {p.valid}, {searched}")
+            lines += [f"    {REFERENCES[key]}" for key in cls.references] + [""]
+    lines += ["losses", *(f"    {loss.name:12s} {REFERENCES.get(loss.source, '')}" for loss in LOSSES.values())]
+    return "\n".join(lines)
+
+
+def _wrapped(doc: str) -> list[str]:
+    import textwrap
+
+    return textwrap.wrap(" ".join(doc.split()), 110, initial_indent="    ", subsequent_indent="    ")
+
+
+def _end(x: float) -> float | None:
+    return x if math.isfinite(x) else None
+
+
+__all__ = ["catalogue", "text"]

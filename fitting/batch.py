@@ -1,0 +1,63 @@
+"""Many tables, many models: results as they complete, and no failure takes another fit with it."""
+
+from __future__ import annotations
+
+import os
+from collections.abc import Iterable, Iterator, Sequence
+from concurrent.futures import ThreadPoolExecutor, as_completed
+from pathlib import Path
+from typing import Any
+
+from ..errors import InputError
+from ..files import StrPath
+from ..tables import Table, load
+from .fit_table import Model, failed, fit, model_class, prepare
+from .losses import named_loss
+from .result import Fit
+
+
+def fit_many(
+    tables: Iterable[Table | StrPath],
+    models: Sequence[Model] = ("gtr", "abc", "sgd", "ward", "ashikhmin_shirley"),
+    *,
+    workers: int | None = None,
+    angles: str = "edge",
+    **options: Any,
+) -> Iterator[Fit]:
+    """Fit every model to every table; yields each :class:`~brdfit.Fit` as it completes, table after table.
+
+    Args:
+        tables: Tables, or paths of table files, read when their turn comes.
+        models: Names, classes or instances, as :func:`brdfit.fit` takes them.
+        workers: Fits at a time; one per core by default. Programs are compiled and run outside Python's lock.
+        angles: Convention of MERL files given by path.
+        options: Further arguments of :func:`brdfit.fit`.
+
+    A file that cannot be read and a fit that raises are failed results, with the reason in words. Wrong arguments (an
+    unknown model or loss) raise ValueError or TypeError before the first fit.
+    """
+    for m in models:
+        model_class(m, anisotropic=False)
+    named_loss(options.get("loss", "log"))
+    return _results(tables, models, workers or os.cpu_count() or 1, angles, options)
+
+
+def _results(
+    tables: Iterable[Table | StrPath], models: Sequence[Model], workers: int, angles: str, options: dict[str, Any]
+) -> Iterator[Fit]:
+    with ThreadPoolExecutor(workers) as pool:
+        for entry in tables:
+            try:
+                table = entry if isinstance(entry, Table) else load(entry, angles=angles)  # type: ignore[arg-type]
+                prepare(table, options.get("max_angle", 80.0), options.get("measure", "solid_angle"))
+            except InputError as fault:
+                for m in models:
+                    yield failed(Path(os.fspath(entry)).stem, m, str(fault), options)  # type: ignore[arg-type]
+                continue
+            running = {pool.submit(fit, table, m, **options): m for m in models}
+            for done in as_completed(running):
+                try:
+                    yield done.result()
+                except Exception as fault:
+                    reason = f"{type(fault).__name__}: {' '.join(str(fault).split())}"
+                    yield failed(table.material, running[done], reason, options)
