@@ -18,8 +18,8 @@ COLOUR_BLOCKS = 2
 """Blocks of the table for refitting the linear coordinates alone."""
 COARSE_BLOCKS = 6
 """Blocks of the table for polishing the best shapes."""
-POLISHED = 6
-"""Starts that are polished on the coarse table, in each chart."""
+POLISHED = 7
+"""Starts that are polished on the coarse table, besides the best one of each further chart."""
 FINISHED = 3
 """Distinct optima of the coarse table that are carried to the whole one, at most."""
 SAME = 1e-3
@@ -60,6 +60,17 @@ class Found:
     passes: int
 
 
+def _varied(ranked: list[tuple[float, Problem, Box, Minimum]]) -> list[tuple[float, Problem, Box, Minimum]]:
+    """The best starts, without those that are a better one's double, and the best of every chart."""
+    kept: list[tuple[float, Problem, Box, Minimum]] = []
+    for r in ranked:
+        double = kept and r[1] is kept[-1][1] and r[0] <= kept[-1][0] * (1 + 1e-9)
+        new_chart = all(r[1] is not k[1] for k in kept)
+        if not double and (len(kept) < POLISHED or new_chart):
+            kept.append(r)
+    return kept
+
+
 def _finite(cost: float) -> float:
     return cost if np.isfinite(cost) and cost < 1e290 else np.inf
 
@@ -74,17 +85,18 @@ def search(problems: list[tuple[Problem, Box, list[NDArray[np.float64]]]]) -> Fo
     colour = Stage.of(min(total, COLOUR_BLOCKS), 1e-2, 1e-2)
     coarse = Stage.of(min(total, COARSE_BLOCKS), 1e-6, 1.0)
     whole = Stage.of(total, 1e-8, 1e-6)
-    polished: list[tuple[float, Problem, Box, Minimum]] = []
-    tried = 0
+    ranked: list[tuple[float, Problem, Box, Minimum]] = []
     for problem, box, starts in problems:
-        tried += len(starts)
         linear = jnp.asarray([c.linear for c, _ in problem.chart.vector(problem.channels)])
         colours = Box(box.lower, box.upper, box.free & linear)
-        ranked = [solve(problem, jnp.asarray(x), colours, colour) for x in starts]
-        ranked.sort(key=lambda m: _finite(float(m.cost)))
-        for start in ranked[:POLISHED]:
-            m = solve(problem, start.x, box, coarse)
-            polished.append((_finite(float(m.cost)), problem, box, m))
+        for x in starts:
+            m = solve(problem, jnp.asarray(x), colours, colour)
+            ranked.append((_finite(float(m.cost)), problem, box, m))
+    ranked.sort(key=lambda r: r[0])
+    polished = []
+    for _, problem, box, m in _varied(ranked):
+        m = solve(problem, m.x, box, coarse)
+        polished.append((_finite(float(m.cost)), problem, box, m))
     polished.sort(key=lambda p: p[0])
     distinct: list[tuple[float, Problem, Box, Minimum]] = []
     counts: list[int] = []
@@ -107,7 +119,7 @@ def search(problems: list[tuple[Problem, Box, list[NDArray[np.float64]]]]) -> Fo
     optima = [Optimum(float(np.sqrt(cost)), count) for cost, count, *_ in finished]
     optima += [Optimum(float(np.sqrt(d[0])), n) for d, n in list(zip(distinct, counts, strict=True))[len(finished) :]]
     _, _, problem, box, best = finished[0]
-    return Found(problem, box, best, tried, _merged(optima), passes)
+    return Found(problem, box, best, sum(len(s) for _, _, s in problems), _merged(optima), passes)
 
 
 def _merged(optima: list[Optimum]) -> tuple[Optimum, ...]:
