@@ -6,65 +6,71 @@ from collections.abc import Iterable
 
 REFERENCES: dict[str, str] = {
     # models and their parts
-    "lambert1760": "Lambert, J. H. (1760). Photometria sive de mensura et gradibus luminis, colorum et umbrae. Augsburg: Klett.",
-    "burley2012": "Burley, B. (2012). Physically-based shading at Disney. In Practical Physically-Based Shading in Film and Game "
-    "Production, ACM SIGGRAPH 2012 Courses. doi:10.1145/2343483.2343493",
-    "schlick1994": "Schlick, C. (1994). An inexpensive BRDF model for physically-based rendering. Computer Graphics Forum 13(3), "
-    "233-246. doi:10.1111/1467-8659.1330233",
-    "smith1967": "Smith, B. G. (1967). Geometrical shadowing of a random rough surface. IEEE Transactions on Antennas and "
-    "Propagation 15(5), 668-671. doi:10.1109/TAP.1967.1138991",
-    "heitz2014": "Heitz, E. (2014). Understanding the masking-shadowing function in microfacet-based BRDFs. Journal of Computer "
-    "Graphics Techniques 3(2), 48-107.",
-    "low2012": "Löw, J., Kronander, J., Ynnerman, A., Unger, J. (2012). BRDF models for accurate and efficient rendering of glossy "
-    "surfaces. ACM Transactions on Graphics 31(1), 9:1-9:14. doi:10.1145/2077341.2077350",
-    "church1990": "Church, E. L., Takacs, P. Z., Leonard, T. A. (1990). The prediction of BRDFs from surface profile measurements. "
-    "Proc. SPIE 1165, Scatter from Optical Components, 136-150.",
-    "cook1982": "Cook, R. L., Torrance, K. E. (1982). A reflectance model for computer graphics. ACM Transactions on Graphics 1(1), "
-    "7-24. doi:10.1145/357290.357293",
-    "bagher2012": "Bagher, M. M., Soler, C., Holzschuch, N. (2012). Accurate fitting of measured reflectances using a Shifted Gamma "
-    "micro-facet distribution. Computer Graphics Forum 31(4), 1509-1518. doi:10.1111/j.1467-8659.2012.03147.x",
-    "ward1992": "Ward, G. J. (1992). Measuring and modeling anisotropic reflection. Computer Graphics (Proc. SIGGRAPH) 26(2), "
-    "265-272. doi:10.1145/142920.134078",
-    "ashikhmin2000": "Ashikhmin, M., Shirley, P. (2000). An anisotropic Phong BRDF model. Journal of Graphics Tools 5(2), 25-32. "
-    "doi:10.1080/10867651.2000.10487522",
-    "torrance1967": "Torrance, K. E., Sparrow, E. M. (1967). Theory for off-specular reflection from roughened surfaces. Journal of "
-    "the Optical Society of America 57(9), 1105-1114. doi:10.1364/JOSA.57.001105",
-    "trowbridge1975": "Trowbridge, T. S., Reitz, K. P. (1975). Average irregularity representation of a rough surface for ray "
-    "reflection. Journal of the Optical Society of America 65(5), 531-536. doi:10.1364/JOSA.65.000531",
-    "walter2007": "Walter, B., Marschner, S. R., Li, H., Torrance, K. E. (2007). Microfacet models for refraction through rough "
-    "surfaces. Eurographics Symposium on Rendering, 195-206. doi:10.2312/EGWR/EGSR07/195-206",
-    "blinn1977": "Blinn, J. F. (1977). Models of light reflection for computer synthesized pictures. Computer Graphics (Proc. "
-    "SIGGRAPH) 11(2), 192-198. doi:10.1145/965141.563893",
-    "oren1994": "Oren, M., Nayar, S. K. (1994). Generalization of Lambert's reflectance model. Proc. SIGGRAPH 94, 239-246. "
-    "doi:10.1145/192161.192213",
-    "hoffman2013": "Hoffman, N. (2013). Background: physics and math of shading. In Physically Based Shading in Theory and "
-    "Practice, ACM SIGGRAPH 2013 Courses. doi:10.1145/2504435.2504457",
+    "lambert1760": "Lambert, J. H. (1760). Photometria sive de mensura et gradibus luminis, colorum et umbrae. Augsburg:"
+    " Klett.",
+    "burley2012": "Burley, B. (2012). Physically-based shading at Disney. In Practical Physically-Based Shading in Film"
+    " and Game Production, ACM SIGGRAPH 2012 Courses. doi:10.1145/2343483.2343493",
+    "schlick1994": "Schlick, C. (1994). An inexpensive BRDF model for physically-based rendering. Computer Graphics "
+    "Forum 13(3), 233-246. doi:10.1111/1467-8659.1330233",
+    "smith1967": "Smith, B. G. (1967). Geometrical shadowing of a random rough surface. IEEE Transactions on Antennas "
+    "and Propagation 15(5), 668-671. doi:10.1109/TAP.1967.1138991",
+    "heitz2014": "Heitz, E. (2014). Understanding the masking-shadowing function in microfacet-based BRDFs. Journal of"
+    " Computer Graphics Techniques 3(2), 48-107.",
+    "low2012": "Löw, J., Kronander, J., Ynnerman, A., Unger, J. (2012). BRDF models for accurate and efficient "
+    "rendering of glossy surfaces. ACM Transactions on Graphics 31(1), 9:1-9:14. "
+    "doi:10.1145/2077341.2077350",
+    "church1990": "Church, E. L., Takacs, P. Z., Leonard, T. A. (1990). The prediction of BRDFs from surface profile "
+    "measurements. Proc. SPIE 1165, Scatter from Optical Components, 136-150.",
+    "cook1982": "Cook, R. L., Torrance, K. E. (1982). A reflectance model for computer graphics. ACM Transactions on "
+    "Graphics 1(1), 7-24. doi:10.1145/357290.357293",
+    "bagher2012": "Bagher, M. M., Soler, C., Holzschuch, N. (2012). Accurate fitting of measured reflectances using a "
+    "Shifted Gamma micro-facet distribution. Computer Graphics Forum 31(4), 1509-1518. "
+    "doi:10.1111/j.1467-8659.2012.03147.x",
+    "ward1992": "Ward, G. J. (1992). Measuring and modeling anisotropic reflection. Computer Graphics (Proc. "
+    "SIGGRAPH) 26(2), 265-272. doi:10.1145/142920.134078",
+    "ashikhmin2000": "Ashikhmin, M., Shirley, P. (2000). An anisotropic Phong BRDF model. Journal of Graphics Tools 5(2), "
+    "25-32. doi:10.1080/10867651.2000.10487522",
+    "torrance1967": "Torrance, K. E., Sparrow, E. M. (1967). Theory for off-specular reflection from roughened surfaces. "
+    "Journal of the Optical Society of America 57(9), 1105-1114. doi:10.1364/JOSA.57.001105",
+    "trowbridge1975": "Trowbridge, T. S., Reitz, K. P. (1975). Average irregularity representation of a rough surface for "
+    "ray reflection. Journal of the Optical Society of America 65(5), 531-536. doi:10.1364/JOSA.65.000531",
+    "walter2007": "Walter, B., Marschner, S. R., Li, H., Torrance, K. E. (2007). Microfacet models for refraction "
+    "through rough surfaces. Eurographics Symposium on Rendering, 195-206. "
+    "doi:10.2312/EGWR/EGSR07/195-206",
+    "blinn1977": "Blinn, J. F. (1977). Models of light reflection for computer synthesized pictures. Computer Graphics"
+    " (Proc. SIGGRAPH) 11(2), 192-198. doi:10.1145/965141.563893",
+    "oren1994": "Oren, M., Nayar, S. K. (1994). Generalization of Lambert's reflectance model. Proc. SIGGRAPH 94, "
+    "239-246. doi:10.1145/192161.192213",
+    "hoffman2013": "Hoffman, N. (2013). Background: physics and math of shading. In Physically Based Shading in Theory "
+    "and Practice, ACM SIGGRAPH 2013 Courses. doi:10.1145/2504435.2504457",
     # data and coordinates
-    "merl": "Matusik, W., Pfister, H., Brand, M., McMillan, L. (2003). A data-driven reflectance model. ACM Transactions on "
-    "Graphics 22(3), 759-769. doi:10.1145/882262.882343",
+    "merl": "Matusik, W., Pfister, H., Brand, M., McMillan, L. (2003). A data-driven reflectance model. ACM "
+    "Transactions on Graphics 22(3), 759-769. doi:10.1145/882262.882343",
     "rusinkiewicz1998": "Rusinkiewicz, S. M. (1998). A new change of variables for efficient BRDF representation. Rendering "
     "Techniques '98, 11-22. doi:10.1007/978-3-7091-6453-2_2",
     # losses, and how errors agree with people
-    "ngan2005": "Ngan, A., Durand, F., Matusik, W. (2005). Experimental analysis of BRDF models. Eurographics Symposium on "
-    "Rendering, 117-126. doi:10.2312/EGWR/EGSR05/117-126",
-    "bieron2020": "Bieron, J., Peers, P. (2020). An adaptive BRDF fitting metric. Computer Graphics Forum 39(4), 59-74. "
-    "doi:10.1111/cgf.14054",
-    "fores2012": "Fores, A., Ferwerda, J., Gu, J. (2012). Toward a perceptually based metric for BRDF modeling. Proc. IS&T 20th "
-    "Color and Imaging Conference, 142-148. doi:10.2352/CIC.2012.20.1.art00025",
-    "lavoue2021": "Lavoué, G., Bonneel, N., Farrugia, J.-P., Soler, C. (2021). Perceptual quality of BRDF approximations: dataset "
-    "and metrics. Computer Graphics Forum 40(2), 327-338. doi:10.1111/cgf.142636",
+    "ngan2005": "Ngan, A., Durand, F., Matusik, W. (2005). Experimental analysis of BRDF models. Eurographics "
+    "Symposium on Rendering, 117-126. doi:10.2312/EGWR/EGSR05/117-126",
+    "bieron2020": "Bieron, J., Peers, P. (2020). An adaptive BRDF fitting metric. Computer Graphics Forum 39(4), 59-74."
+    " doi:10.1111/cgf.14054",
+    "fores2012": "Fores, A., Ferwerda, J., Gu, J. (2012). Toward a perceptually based metric for BRDF modeling. Proc. "
+    "IS&T 20th Color and Imaging Conference, 142-148. doi:10.2352/CIC.2012.20.1.art00025",
+    "lavoue2021": "Lavoué, G., Bonneel, N., Farrugia, J.-P., Soler, C. (2021). Perceptual quality of BRDF "
+    "approximations: dataset and metrics. Computer Graphics Forum 40(2), 327-338. doi:10.1111/cgf.142636",
     "sharma2005": "Sharma, G., Wu, W., Dalal, E. N. (2005). The CIEDE2000 color-difference formula. Color Research and "
     "Application 30(1), 21-30. doi:10.1002/col.20070",
     # estimation, uncertainty, software
-    "more1978": "Moré, J. J. (1978). The Levenberg-Marquardt algorithm: implementation and theory. In Numerical Analysis, Lecture "
-    "Notes in Mathematics 630, 105-116. doi:10.1007/BFb0067700",
+    "more1978": "Moré, J. J. (1978). The Levenberg-Marquardt algorithm: implementation and theory. In Numerical "
+    "Analysis, Lecture Notes in Mathematics 630, 105-116. doi:10.1007/BFb0067700",
     "white1980": "White, H. (1980). A heteroskedasticity-consistent covariance matrix estimator and a direct test for "
     "heteroskedasticity. Econometrica 48(4), 817-838. doi:10.2307/1912934",
-    "kunsch1989": "Künsch, H. R. (1989). The jackknife and the bootstrap for general stationary observations. Annals of Statistics "
-    "17(3), 1217-1241. doi:10.1214/aos/1176347265",
-    "optimistix": "Rader, J., Lyons, T., Kidger, P. (2024). Optimistix: modular optimisation in JAX and Equinox. arXiv:2402.09983.",
-    "jax": "Bradbury, J., Frostig, R., Hawkins, P., Johnson, M. J., Leary, C., Maclaurin, D., Necula, G., Paszke, A., VanderPlas, J., "
-    "Wanderman-Milne, S., Zhang, Q. (2018). JAX: composable transformations of Python+NumPy programs.",
+    "kunsch1989": "Künsch, H. R. (1989). The jackknife and the bootstrap for general stationary observations. Annals of"
+    " Statistics 17(3), 1217-1241. doi:10.1214/aos/1176347265",
+    "optimistix": "Rader, J., Lyons, T., Kidger, P. (2024). Optimistix: modular optimisation in JAX and Equinox. "
+    "arXiv:2402.09983.",
+    "jax": "Bradbury, J., Frostig, R., Hawkins, P., Johnson, M. J., Leary, C., Maclaurin, D., Necula, G., "
+    "Paszke, A., VanderPlas, J., Wanderman-Milne, S., Zhang, Q. (2018). JAX: composable transformations "
+    "of Python+NumPy programs.",
     "colour": "Mansencal, T. et al. Colour: a Python package for colour science. doi:10.5281/zenodo.3757045",
 }
 """Full citations by key."""

@@ -35,10 +35,10 @@ def luminance(values: Reals) -> Reals:
 
 
 def exposure_of(values: Reals) -> float:
-    """Factor that takes the 80th percentile of the luminance of ``[n, C]`` to 0.5, half way to white."""
+    """Factor that takes the geometric mean of the luminance of ``[n, C]`` to 0.18, the middle grey of photographers."""
     y = luminance(values)
-    level = float(np.percentile(y[np.isfinite(y)], 80)) if np.isfinite(y).any() else 1.0
-    return 0.5 / level if level > 0 else 1.0
+    y = y[np.isfinite(y) & (y > 0)]
+    return float(0.18 / np.exp(np.log(y).mean())) if len(y) else 1.0
 
 
 def screen(values: Reals, exposure: float) -> Reals:

@@ -162,9 +162,9 @@ def _read(group: Any) -> Evidence:
         if name in group:
             sub = group[name]
             kinds = get_type_hints(cls)
-            parts[name] = cls(**{
-                f.name: sub[f.name][()] if f.name in sub else kinds[f.name](sub.attrs[f.name]) for f in fields(cls)
-            })
+            parts[name] = cls(
+                **{f.name: sub[f.name][()] if f.name in sub else kinds[f.name](sub.attrs[f.name]) for f in fields(cls)}
+            )
     return Evidence(
         material=head["material"],
         source=head["source"],

@@ -15,12 +15,12 @@ from numpy.typing import NDArray
 from ..angles import directions, half_difference
 from ..tables import HalfDifferenceGrid, SphericalGrid, Table
 from .colours import channel_names, delta_e, exposure_of, screen
+from .evaluate import evaluate
 from .evidence import Albedo, Evidence, Lobes, Maps, Sphere
 from .physics import ANGLES, albedo_directions, albedo_of_values
 
 if TYPE_CHECKING:
     from ..fitting.result import Fit
-    from ..models import BRDF
 
 Reals = NDArray[np.float64]
 
@@ -32,9 +32,6 @@ PIXELS = 144
 
 LIGHT = np.array([-0.45, 0.55, 0.704])
 """Direction to the light of the sphere: from the upper left, 45 degrees from the viewer."""
-
-BLOCK = 4096
-"""Directions that a model sees at once."""
 
 
 def fit_key(fit: Fit) -> str:
@@ -53,7 +50,11 @@ def gather(table: Table, fits: Sequence[Fit]) -> Evidence:
     pieces = [lobe_at[1:3] if lobe_at else None, sphere_at[1:3], albedo_at[:2], cells_at[:2]]
     sizes = [0 if p is None else p[0].shape[0] for p in pieces]
     wi, wo = (np.concatenate([p[k] for p in pieces if p is not None]) for k in (0, 1))
-    values = np.stack([_evaluate(f.model, wi, wo, table.channels) for f in fits]) if fits else np.zeros((0, len(wi), table.channels))
+    values = (
+        np.stack([evaluate(f.model, wi, wo, table.channels) for f in fits])
+        if fits
+        else np.zeros((0, len(wi), table.channels))
+    )
     at_lobes, at_sphere, at_albedo, at_cells = np.split(values, np.cumsum(sizes)[:-1], axis=1)
 
     lobes = None
@@ -120,41 +121,6 @@ def _bracket(nodes: Reals, x: Reals, period: float | None = None) -> tuple[NDArr
     return low, (low + 1) % n, t
 
 
-def _evaluate(model: BRDF | None, wi: Reals, wo: Reals, count: int) -> Reals:
-    """Values ``[n, C]`` of a fitted model in float64; NaN without a model."""
-    if model is None:
-        return np.full((len(wi), count), np.nan)
-    import jax
-
-    n = -(-len(wi) // BLOCK) * BLOCK
-    pad = np.zeros((n, 3))
-    pad[:, 2] = 1.0
-    blocks = []
-    for w in (wi, wo):
-        full = pad.copy()
-        full[: len(w)] = w
-        blocks.append(full.reshape(-1, BLOCK, 3))
-    with jax.enable_x64(True):
-        out = np.asarray(_program()(model, *blocks))
-    return np.broadcast_to(out.reshape(n, -1)[: len(wi)], (len(wi), count))
-
-
-_compiled: list[Any] = []
-
-
-def _program() -> Any:
-    """The one compiled function, made on first use so that rebuilding a report does not import JAX for it."""
-    if not _compiled:
-        import equinox as eqx
-        import jax
-
-        def run(model: BRDF, wi: Any, wo: Any) -> Any:
-            return jax.lax.map(lambda pair: model(*pair), (wi, wo))
-
-        _compiled.append(eqx.filter_jit(run))
-    return _compiled[0]
-
-
 def _in_plane(theta: Reals, phi: float = 0.0) -> Reals:
     """Unit vectors in the plane y = 0; negative angles lie on the other side of the normal."""
     return np.stack([np.sin(theta) * np.cos(phi), np.zeros_like(theta), np.sin(np.pi / 2 - np.abs(theta))], -1)
@@ -195,9 +161,17 @@ def _lobe_directions(table: Table, missing: dict[str, str]) -> tuple[tuple[Reals
         both = np.concatenate([planes[:, :, ::-1, backward], planes[:, :, :, forward]], axis=2)
         wi = np.repeat(_in_plane(-theta_i), len(to), axis=0)
         wo = np.tile(_in_plane(to), (len(rows), 1))
-        how = f"Measured values are those of the cells nearest to the plane of incidence, at most {np.degrees(off):.1f}° from it."
+        how = (
+            f"Measured values are those of the cells nearest to the plane of incidence, within {np.degrees(off):.1f}° of it."
+        )
         shape = (len(rows), len(to))
-        return (np.degrees(theta_i), np.degrees(np.broadcast_to(to, shape))), wi, wo, np.moveaxis(both, 0, -1).reshape(-1, table.channels), how
+        return (
+            (np.degrees(theta_i), np.degrees(np.broadcast_to(to, shape))),
+            wi,
+            wo,
+            np.moveaxis(both, 0, -1).reshape(-1, table.channels),
+            how,
+        )
     missing["lobes"] = "lobes need values in planes of incidence, and the samples of this table do not lie on such a grid"
     return None
 
@@ -256,7 +230,9 @@ def _albedo(table: Table, at: tuple[Reals, Reals, list[list[Reals]]], values: Re
     return Albedo(np.array(ANGLES), measured, covered, fitted, error)
 
 
-def _cells(table: Table, max_angle: float) -> tuple[Reals, Reals, Reals, NDArray[np.bool_], NDArray[np.intp], Reals, Reals, str]:
+def _cells(
+    table: Table, max_angle: float
+) -> tuple[Reals, Reals, Reals, NDArray[np.bool_], NDArray[np.intp], Reals, Reals, str]:
     """A sample of the table's cells: directions, values ``[n, C]``, which are fitted, bin, edges in degrees, in words."""
     grid = table.layout
     if isinstance(grid, HalfDifferenceGrid):
@@ -277,8 +253,8 @@ def _cells(table: Table, max_angle: float) -> tuple[Reals, Reals, Reals, NDArray
         which = np.broadcast_to(cell, (len(ph), len(th), len(td), len(pd))).ravel()
         edges_h = np.append(grid.theta_h_edges[:-1][sub[0]], grid.theta_h_edges[-1])
         edges_d = np.append(grid.theta_d_edges[:-1][sub[1]], grid.theta_d_edges[-1])
-        part = f"{len(th)} × {len(td)} × {len(pd)} of {h} × {d} × {p} cells"
-        how = f"From {part} (theta_h × theta_d × phi_d), as far as both polar angles are at most {max_angle:g}°."
+        part = f"{len(th)} \u00d7 {len(td)} \u00d7 {len(pd)} of {h} \u00d7 {d} \u00d7 {p} cells"
+        how = f"From {part} (theta_h \u00d7 theta_d \u00d7 phi_d), as far as both polar angles are at most {max_angle:g}°."
     else:
         all_i, all_o = grid.directions()
         step = max(1, int(np.prod(grid.shape)) // 50_000)
@@ -289,15 +265,13 @@ def _cells(table: Table, max_angle: float) -> tuple[Reals, Reals, Reals, NDArray
         a_h, a_d, _, _ = half_difference(wi, wo)
         bins = [np.clip(np.searchsorted(e, a, side="right") - 1, 0, 29) for e, a in ((edges_h, a_h), (edges_d, a_d))]
         which = bins[0] * 30 + bins[1]
-        how = f"{len(wi)} samples, collected in bins of theta_h and theta_d, as far as both polar angles are at most {max_angle:g}°."
+        how = f"{len(wi)} samples in bins of theta_h and theta_d, as far as both polar angles are at most {max_angle:g}°."
     limit = np.cos(np.radians(max_angle)) - 1e-12
     used = mask & (wi[:, 2] >= limit) & (wo[:, 2] >= limit)
     return wi, wo, values, used, which, np.degrees(edges_h), np.degrees(edges_d), how
 
 
-def _maps(
-    fitted: Reals, cells: tuple[Reals, Reals, Reals, NDArray[np.bool_], NDArray[np.intp], Reals, Reals, str]
-) -> Maps:
+def _maps(fitted: Reals, cells: tuple[Reals, Reals, Reals, NDArray[np.bool_], NDArray[np.intp], Reals, Reals, str]) -> Maps:
     wi, _, values, used, which, edges_h, edges_d, how = cells
     shape = (len(edges_h) - 1, len(edges_d) - 1)
     cosine = wi[used, 2:3]

@@ -4,7 +4,8 @@ from __future__ import annotations
 
 import math
 import re
-from collections.abc import Sequence
+from collections.abc import Iterable, Sequence
+from pathlib import PurePath
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
@@ -26,9 +27,9 @@ LOSSES: dict[str, str] = {
     "log": "ln(1 + f cos θi)",
     "low": "log, θo uniform (Löw)",
     "bieron": "log, weighted cos θo",
-    "ngan": "(f − m) cos θi",
+    "ngan": "(f \u2212 m) cos θi",
     "cuberoot": "cube root of f cos θi",
-    "relative": "(f − m)/m",
+    "relative": "(f \u2212 m)/m",
 }
 """The named losses in the order of the table, and what they compare."""
 
@@ -89,7 +90,7 @@ def _section(number: int, fits: list[Fit], evidence: Evidence | None) -> View:
     order = sorted(range(len(fits)), key=lambda k: (not math.isfinite(perceptual(fits[k])), perceptual(fits[k]), k))
     ranked = [(fits[k], names[k]) for k in order]
     rows = {key: m for m, key in enumerate(evidence.keys)} if evidence else {}
-    drawn = [(rows[fit_key(f)], label) for f, label in zip(fits, names, strict=True) if f.model_name and _shows(f, rows)]
+    drawn = [(rows[fit_key(f)], label) for f, label in ranked if _shows(f, rows)]
     channel_names = _channel_names(fits, evidence)
     salt = f"brdfit-{number}-"
     return {
@@ -102,11 +103,11 @@ def _section(number: int, fits: list[Fit], evidence: Evidence | None) -> View:
         "tradeoff": _tradeoff(ranked, salt),
         "spheres": _spheres(evidence, drawn, first.material),
         "lobes": _lobes(evidence, drawn, first.material, salt),
-        "channels": _channels(evidence, ranked, names, fits, rows, channel_names, salt),
+        "channels": _channels(evidence, ranked, rows, channel_names, salt),
         "maps": _maps(evidence, drawn, first.material),
-        "albedo": _albedo(evidence, drawn, first.material, salt),
-        "losses": _losses(fits, names),
-        "physics": [_physics(f, label, evidence, rows) for f, label in zip(fits, names, strict=True) if f.parameters],
+        "albedo": _albedo(evidence, drawn, first, salt),
+        "losses": _losses(*zip(*ranked, strict=True)),
+        "physics": [_physics(f, label, evidence, rows) for f, label in ranked if f.parameters],
         "models": [_model(f, label, channel_names, salt) for f, label in ranked],
         "missing": _missing(evidence),
         "overview": {label: (perceptual(f), f.converged) for f, label in zip(fits, names, strict=True)},
@@ -129,9 +130,19 @@ def _about(fits: Sequence[Fit]) -> str:
     cells = f.cells
     used, masked, total = (cells.get(k, 0) for k in ("used", "masked", "total"))
     beyond = total - used - masked
-    settings = sorted({f"loss {f.loss}, measure {f.measure.replace('_', ' ')}, angles at the cell's {f.angles}" for f in fits})
-    text = f"{f.source}" + (f" (SHA-256 {f.sha256[:12]}…)" if f.sha256 else "") + ". " + "; ".join(settings).capitalize() + ". "
-    text += f"{words.thousands(used)} of {words.thousands(total)} cells fitted, {words.thousands(masked)} masked as not measured"
+    settings = sorted(
+        {f"loss {f.loss}, measure {f.measure.replace('_', ' ')}, angles at the cell's {f.angles}" for f in fits}
+    )
+    text = (
+        PurePath(f.source).name
+        + (f" (SHA-256 {f.sha256[:12]}…)" if f.sha256 else "")
+        + ". "
+        + "; ".join(settings).capitalize()
+        + ". "
+    )
+    text += (
+        f"{words.thousands(used)} of {words.thousands(total)} cells fitted, {words.thousands(masked)} masked as not measured"
+    )
     return text + (f", {words.thousands(beyond)} measured but beyond {f.max_angle:g}°." if beyond > 0 else ".")
 
 
@@ -142,7 +153,7 @@ def _headline(ranked: Sequence[tuple[Fit, str]]) -> str:
         return f"No model could be fitted to {material}."
     best, label = good[0]
     error = perceptual(best)
-    among = f"Best of {words.count(len(ranked), '').strip()}" if len(ranked) > 1 else "The one fit"
+    among = f"Best of {words.number(len(ranked))}" if len(ranked) > 1 else "The one fit"
     text = f"{among} for {material}: {label}. Perceptual error {significant(error, 2)}: {words.grade(error)}."
     if not best.converged:
         text += " This fit did not converge."
@@ -152,7 +163,9 @@ def _headline(ranked: Sequence[tuple[Fit, str]]) -> str:
         good_enough = [g for g in good if perceptual(g[0]) <= words.SEEN and "solve" in g[0].seconds]
         if len(good_enough) > 1:
             fastest = min(good_enough, key=lambda g: g[0].seconds["solve"])
-            text += f"; of the {words.count(len(good_enough), '').strip()} at or below {words.SEEN:g}, {fastest[1]} is the fastest to fit"
+            text += (
+                f"; of the {words.number(len(good_enough))} at or below {words.SEEN:g}, {fastest[1]} is the fastest to fit"
+            )
             text += f" ({words.seconds(fastest[0].seconds['solve'])})"
         text += "."
     failed = [label for f, label in ranked if not f.converged and f is not best]
@@ -165,15 +178,15 @@ def _rank(rank: int, f: Fit, label: str) -> View:
     error = perceptual(f)
     solve, passes = f.seconds.get("solve", math.nan), f.passes
     return {
-        "rank": str(rank) if math.isfinite(error) else "–",
+        "rank": str(rank) if math.isfinite(error) else words.NONE,
         "label": label,
         "error": significant(error, 3),
         "grade": words.grade_index(error),
         "words": words.grade(error) if math.isfinite(error) else f"failed: {f.reason}",
-        "numbers": sum(v.size for n, v in f.parameters.items() if n not in f.fixed) or "–",
+        "numbers": sum(v.size for n, v in f.parameters.items() if n not in f.fixed) or words.NONE,
         "solve": words.seconds(solve),
-        "pass": words.seconds(solve / passes) if passes else "–",
-        "passes": passes or "–",
+        "pass": words.seconds(solve / passes) if passes else words.NONE,
+        "passes": passes or words.NONE,
         "compile": words.seconds(f.seconds.get("compile", math.nan)),
         "converged": f.converged,
         "anchor": _anchor(f, label),
@@ -209,7 +222,9 @@ def _spheres(evidence: Evidence | None, drawn: Sequence[tuple[int, str]], materi
             "label": label,
             "image": plots.sphere(s, s.fitted[m]),
             "difference": plots.difference(s, m, top) if known else None,
-            "mean": significant(float(np.nanmean(s.difference[m])), 2) if known and np.isfinite(s.difference[m]).any() else "–",
+            "mean": significant(float(np.nanmean(s.difference[m])), 2)
+            if known and np.isfinite(s.difference[m]).any()
+            else words.NONE,
         }
         for m, label in drawn
     ]
@@ -231,15 +246,19 @@ def _lobes(evidence: Evidence | None, drawn: Sequence[tuple[int, str]], material
         return None
     part = evidence.lobes
     at = words.listed(f"{a:.3g}°" for a in part.theta_i)
-    alt = f"Measured and fitted BRDF of {material} in the plane of incidence, light at {at}, logarithmic above and near the peak below"
-    return {"svg": plots.lobes(part, drawn, _plain(alt), salt + "lobes"), "how": part.how, "colour": part.measured.shape[-1] == 3}
+    alt = (
+        f"Measured and fitted BRDF of {material} in the plane of incidence, light at {at}; above logarithmic, below the peak"
+    )
+    return {
+        "svg": plots.lobes(part, drawn, _plain(alt), salt + "lobes"),
+        "how": part.how,
+        "colour": part.measured.shape[-1] == 3,
+    }
 
 
 def _channels(
     evidence: Evidence | None,
     ranked: Sequence[tuple[Fit, str]],
-    names: list[str],
-    fits: list[Fit],
     rows: dict[str, int],
     channel_names: tuple[str, ...],
     salt: str,
@@ -260,17 +279,22 @@ def _maps(evidence: Evidence | None, drawn: Sequence[tuple[int, str]], material:
     signed = [(label, evidence.maps.signed[m]) for m, label in drawn]
     said = "; ".join(f"{label} mean {significant(float(np.nanmean(s)), 2)}" for label, s in signed if np.isfinite(s).any())
     alt = f"Maps of the residual of each fit of {material} over theta_h and theta_d, signed mean above and RMS below: {said}"
-    return {"png": plots.maps(evidence.maps, drawn), "alt": alt, "how": evidence.maps.how, "width": 17.5 * max(len(drawn), 2) + 12}
+    return {
+        "png": plots.maps(evidence.maps, drawn),
+        "alt": alt,
+        "how": evidence.maps.how,
+        "width": 17.5 * max(len(drawn), 2) + 12,
+    }
 
 
-def _albedo(evidence: Evidence | None, drawn: Sequence[tuple[int, str]], material: str, salt: str) -> View | None:
+def _albedo(evidence: Evidence | None, drawn: Sequence[tuple[int, str]], first: Fit, salt: str) -> View | None:
     if evidence is None or evidence.albedo is None or not drawn:
         return None
     part = evidence.albedo
-    alt = _plain(f"Directional albedo of {material} over the angle of incidence, measured and for each fit")
+    alt = _plain(f"Directional albedo of {first.material} over the angle of incidence, measured and for each fit")
     errors = part.error[[m for m, _ in drawn]]
     worst = float(np.nanmax(errors)) if np.isfinite(errors).any() else math.nan
-    return {"svg": plots.albedo(part, drawn, alt, salt + "albedo"), "error": significant(worst, 1)}
+    return {"svg": plots.albedo(part, drawn, first.max_angle, alt, salt + "albedo"), "error": significant(worst, 1)}
 
 
 def _losses(fits: Sequence[Fit], names: Sequence[str]) -> View:
@@ -282,14 +306,16 @@ def _losses(fits: Sequence[Fit], names: Sequence[str]) -> View:
         finite = [v for v in values if math.isfinite(v)]
         best = min(finite) if finite else math.nan
         cells = [{"text": significant(v, 3), "best": v == best and len(finite) > 1} for v in values]
-        table.append({"name": name, "about": LOSSES.get(name, ""), "cells": cells, "fitted": any(f.loss == name for f in fits)})
+        table.append(
+            {"name": name, "about": LOSSES.get(name, ""), "cells": cells, "fitted": any(f.loss == name for f in fits)}
+        )
     return {"names": list(names), "rows": table}
 
 
 def _physics(f: Fit, label: str, evidence: Evidence | None, rows: dict[str, int]) -> View:
     f0 = physics.normal_reflectance(f.model_name, f.parameters)
     width = physics.lobe_width(f.model_name, f.parameters)
-    view: View = {"label": label, "f0": None, "width": None, "energy": "not computed"}
+    view: View = {"label": label, "f0": None, "width": None, "energy": "not computed", "energy_warn": False}
     if f0 is not None:
         view["f0"] = {
             "value": words.triple(f0.value),
@@ -302,7 +328,7 @@ def _physics(f: Fit, label: str, evidence: Evidence | None, rows: dict[str, int]
         if f0.value.shape == (3,) and np.isfinite(f0.value).all():
             substance, distance = materials.nearest(f0.value)
             view["f0"]["nearest"] = substance.name
-            view["f0"]["nearest_value"] = words.triple(substance.f0)
+            view["f0"]["nearest_value"] = " ".join(f"{v:.3g}" for v in substance.f0)
             view["f0"]["distance"] = significant(distance, 2)
             view["f0"]["far"] = distance > 0.15
             view["f0"]["swatch"], view["f0"]["nearest_swatch"] = _hex(f0.value), _hex(np.array(substance.f0))
@@ -334,7 +360,7 @@ def _model(f: Fit, label: str, channel_names: tuple[str, ...], salt: str) -> Vie
         "converged": f.converged,
         "reason": f.reason,
         "parameters": _parameters(f, channel_names),
-        "remarks": _remarks(f),
+        "remarks": _remarks(f, channel_names),
         "time": _time(f),
         "code": f.model is not None,
     }
@@ -381,8 +407,10 @@ def _parameters(f: Fit, channel_names: tuple[str, ...]) -> View:
                 "shared": value.ndim == 0,
                 "meaning": spec.meaning if spec else "",
                 "unit": spec.unit if spec else "",
-                "range": _range(spec.valid.lower, spec.valid.upper, spec.valid.open_lower, spec.valid.open_upper) if spec else "–",
-                "searched": _range(*spec.search) if spec else "–",
+                "range": _range(spec.valid.lower, spec.valid.upper, spec.valid.open_lower, spec.valid.open_upper)
+                if spec
+                else words.NONE,
+                "searched": _range(*spec.search) if spec else words.NONE,
                 "governs": governing.get(name),
             }
         )
@@ -411,50 +439,83 @@ def _end(x: float) -> str:
     return ("" if mantissa == "1" else words.minus(mantissa) + "·") + "10" + words.superscript(int(exponent))
 
 
-def _remarks(f: Fit) -> list[View]:
+def _remarks(f: Fit, channel_names: tuple[str, ...]) -> list[View]:
     out: list[View] = []
 
     def say(text: str, warn: bool = False) -> None:
-        out.append({"text": text, "warn": warn})
+        out.append({"text": text[:1].upper() + text[1:], "warn": warn})
 
-    if f.at_bound:
-        say(f"At a bound of the search box: {'; '.join(f.at_bound)}. The optimum may lie beyond it.", True)
+    def names(elements: Iterable[str]) -> str:
+        return words.listed(_element(e, channel_names) for e in elements)
+
+    at_limit, at_box = _bounds(f)
+    if at_limit:
+        say(f"at the limit of what the model allows: {names(at_limit)}. The data ask for no such part, or for more of it.")
+    if at_box:
+        say(f"at a bound of the search box: {names(at_box)}. A wider box may fit better.", True)
     if f.undetermined:
-        say(f"Not determined by the data: {words.listed(f.undetermined)}. Any value does about as well.", True)
+        say(f"not determined by the data: {names(f.undetermined)}. Other values do about as well.", True)
     if f.fixed:
-        say(f"Held fixed: {words.listed(f.fixed)}.")
+        say(f"held fixed: {names(f.fixed)}.")
     pairs = f.strong_correlations()
     if pairs:
-        shown = "; ".join(f"{a} with {b} ({words.minus(f'{r:.3f}')})" for a, b, r in pairs[:6])
-        more = f"; and {len(pairs) - 6} more pairs" if len(pairs) > 6 else ""
-        say(f"Strongly correlated estimates: {shown}{more}. Trust them together, not one by one.")
-    if f.optima:
+        shown = "; ".join(
+            f"{_element(b, channel_names)} with {_element(a, channel_names)} ({words.minus(f'{r:.3f}')})"
+            for a, b, r in pairs[:6]
+        )
+        more = f"; and {words.count(len(pairs) - 6, 'more pair')}" if len(pairs) > 6 else ""
+        say(f"strongly correlated estimates: {shown}{more}. Trust them together, not one by one.")
+    if f.optima and f.starts > 1:
         best = f.optima[0]
-        error = "" if not math.isfinite(best.error) else f" ({f.loss} error {significant(best.error, 4)})"
-        text = f"{words.count(f.starts, 'start').capitalize()}: {words.count(best.starts, '').strip()} agreed on the best optimum{error}"
+        error = f" ({f.loss} error {significant(best.error, 4)})" if math.isfinite(best.error) else ""
+        text = f"{words.count(f.starts, 'start')}: {words.number(best.starts)} reached the best optimum{error}"
         others = [
-            f"{significant(o.error, 4)} ({words.count(o.starts, 'start')})" for o in f.optima[1:5] if math.isfinite(o.error)
+            f"{words.number(o.starts)} reached {significant(o.error, 4)}" for o in f.optima[1:5] if math.isfinite(o.error)
         ]
-        if others:
-            text += f"; other optima at {words.listed(others)}"
-        lost = f.starts - sum(o.starts for o in f.optima)
-        if lost > 0:
-            text += f"; {words.count(lost, 'start')} ended nowhere"
-        say(text + ".", best.starts == 1 and f.starts > 1)
+        text += "".join(f", {o}" for o in others)
+        left = f.starts - sum(o.starts for o in f.optima)
+        text += f"; {words.number(left)} {'was' if left == 1 else 'were'} not followed to the end." if left > 0 else "."
+        say(text)
     elif f.starts == 1:
-        say("One start only: a better optimum may exist.", True)
-    governing = f.governing()
+        say("one start only: a better optimum may exist.", True)
+    known = {n for u in (f.stderr, f.spread) for n, v in u.items() if np.isfinite(v).any()}
+    governing = {n: g for n, g in f.governing().items() if n in known}
     misfit = [n for n, g in governing.items() if g == "spread"]
     if misfit and len(misfit) == len(governing):
         say(
-            "For every parameter the spread over angular bands exceeds the noise: what limits these numbers is the form "
+            "for every parameter the spread over angular bands exceeds the noise: what limits these numbers is the form "
             "of the model, not the measurement."
         )
     elif misfit:
-        say(f"The form of the model, not noise, limits {words.listed(misfit)}.")
+        say(f"the form of the model, not noise, limits {words.listed(misfit)}.")
     if f.model is None and f.parameters:
-        say("The code of this model is not part of the package: its numbers are kept, its meaning is not.")
+        say("the code of this model is not part of the package: its numbers are kept, its formula is not.")
     return out
+
+
+def _element(text: str, channel_names: tuple[str, ...]) -> str:
+    """``specular[1]`` as ``specular G``."""
+
+    def name(match: re.Match[str]) -> str:
+        k = int(match.group(1))
+        return f" {channel_names[k]}" if k < len(channel_names) else match.group(0)
+
+    return re.sub(r"\[(\d+)\]", name, text)
+
+
+def _bounds(f: Fit) -> tuple[list[str], list[str]]:
+    """Parameters at a bound: those where the formula ends, and those where only the search does."""
+    from ..models import parameters_of
+
+    valid = {p.name: (p.valid.lower, p.valid.upper) for p in parameters_of(f.model)} if f.model is not None else {}
+    limit, box = [], []
+    for text in f.at_bound:
+        match = re.match(r"(\w+)(?:\[(\d+)\])?", text)
+        name, index = (match.group(1), int(match.group(2) or 0)) if match else ("", 0)
+        value = np.atleast_1d(f.parameters.get(name, np.nan))
+        at_limit = index < len(value) and value[index] in valid.get(name, ())
+        (limit if at_limit else box).append(text)
+    return limit, box
 
 
 def _time(f: Fit) -> str:
@@ -474,7 +535,9 @@ def _missing(evidence: Evidence | None) -> list[str]:
     out = []
     for name, title in MISSING.items():
         if name in evidence.missing:
-            out.append(f"No {title}: {evidence.missing[name]}." if getattr(evidence, name) is None else f"{evidence.missing[name]}.")
+            out.append(
+                f"No {title}: {evidence.missing[name]}." if getattr(evidence, name) is None else f"{evidence.missing[name]}."
+            )
     return [o[:1].upper() + o[1:] for o in out]
 
 
@@ -489,7 +552,7 @@ def _overview(sections: Sequence[View]) -> View:
         cells = []
         for n in heads:
             error, converged = s["overview"].get(n, (math.nan, None))
-            text = significant(error, 2) if math.isfinite(error) else ("–" if converged is None else "failed")
+            text = significant(error, 2) if math.isfinite(error) else (words.NONE if converged is None else "failed")
             cells.append({"text": text, "grade": words.grade_index(error), "best": n == best, "doubt": converged is False})
         rows.append({"material": s["material"], "anchor": s["anchor"], "cells": cells, "best": best or "none"})
     wins = {n: sum(r["best"] == n for r in rows) for n in heads}

@@ -9,6 +9,7 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from ..quadrature import gauss_legendre
+from .evaluate import evaluate
 
 Reals = NDArray[np.float64]
 
@@ -81,12 +82,16 @@ def albedo_of_values(values: Reals, weights: list[list[Reals]]) -> tuple[Reals, 
     return np.array(rho), np.array(error)
 
 
-def directional_albedo(
-    brdf: Callable[[Reals, Reals], ArrayLike], angles: tuple[float, ...] = ANGLES
-) -> tuple[Reals, Reals]:
-    """Fraction of light from each of ``angles`` (degrees) that ``brdf`` returns, and its error, each ``[A, C]``."""
+def directional_albedo(brdf: Callable[[Reals, Reals], ArrayLike], angles: tuple[float, ...] = ANGLES) -> tuple[Reals, Reals]:
+    """Fraction of light from each of ``angles`` (degrees) that ``brdf`` returns, and its error, each ``[A, C]``.
+
+    ``brdf`` is a model, which is evaluated in float64, or any function of unit vectors ``[n, 3]``.
+    """
+    from ..models import BRDF, channels
+
     wi, wo, weights = albedo_directions(angles)
-    return albedo_of_values(np.asarray(brdf(wi, wo), float), weights)
+    values = evaluate(brdf, wi, wo, channels(brdf)) if isinstance(brdf, BRDF) else np.asarray(brdf(wi, wo), float)
+    return albedo_of_values(values, weights)
 
 
 def energy_verdict(rho: Reals, error: Reals, angles: tuple[float, ...] = ANGLES) -> str:
@@ -99,8 +104,8 @@ def energy_verdict(rho: Reals, error: Reals, angles: tuple[float, ...] = ANGLES)
     if not np.isfinite(top[over[0]]):
         return "albedo is not a number"
     worst = int(np.nanargmax(top))
-    until = f"up to {angles[over[0] - 1]:g}°" if over[0] else "at no angle from 0° on"
-    return f"returns more light than falls on it: albedo ≤ 1 only {until}, {top[worst]:.2f} at {angles[worst]:g}°"
+    until = f"only up to {angles[over[0] - 1]:g}°" if over[0] else "nowhere"
+    return f"returns more light than falls on it: albedo ≤ 1 {until}, {top[worst]:.2f} at {angles[worst]:g}°"
 
 
 @dataclass(frozen=True)
@@ -123,7 +128,9 @@ def normal_reflectance(model: str, parameters: Mapping[str, Reals]) -> NormalRef
         return NormalReflectance(value, "specular · F(ior, 0°)", "scale of the lobe: F0 so far as its normalised D is right")
     if model == "sgd" and {"specular", "f0", "f1"} <= set(p):
         value = np.atleast_1d(p["specular"] * (p["f0"] - p["f1"]))
-        return NormalReflectance(value, "specular · (f0 - f1)", "scale of the lobe: F0 so far as its normalised D is right")
+        return NormalReflectance(
+            value, "specular · (f0 \u2212 f1)", "scale of the lobe: F0 so far as its normalised D is right"
+        )
     return None
 
 

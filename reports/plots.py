@@ -53,23 +53,30 @@ _STYLE = {
 
 def styles(names: Sequence[str]) -> dict[str, dict[str, Any]]:
     """Colour, dash and marker for each label; those of the five models are always the same."""
-    spare = iter(OTHERS * (1 + len(names) // len(OTHERS)))
-    return {
-        n: {
-            "color": PALETTE.get(n) or next(spare),
-            "linestyle": DASHES[k % len(DASHES)],
-            "marker": MARKERS[k % len(MARKERS)],
-        }
-        for k, n in enumerate(names)
-    }
+    known = list(PALETTE)
+    out: dict[str, dict[str, Any]] = {}
+    spare = 0
+    for n in names:
+        if n in PALETTE:
+            k, colour = known.index(n), PALETTE[n]
+        else:
+            k, colour = spare + 1, OTHERS[spare % len(OTHERS)]
+            spare += 1
+        out[n] = {"color": colour, "linestyle": DASHES[k % len(DASHES)], "marker": MARKERS[k % len(MARKERS)]}
+    return out
 
 
-def _figure(width: float, height: float, rows: int = 1, columns: int = 1, **options: Any) -> tuple[Any, NDArray[Any]]:
+def _figure(
+    width: float, height: float, margins: tuple[float, float, float, float], rows: int = 1, columns: int = 1, **options: Any
+) -> tuple[Any, NDArray[Any]]:
+    """A figure of ``width`` x ``height`` inches with axes inside ``margins`` (left, right, bottom, top), in inches."""
     from matplotlib.backends.backend_agg import FigureCanvasAgg
     from matplotlib.figure import Figure
 
-    figure = Figure(figsize=(width, height), layout="constrained")
+    figure = Figure(figsize=(width, height))
     FigureCanvasAgg(figure)
+    left, right, bottom, top = margins
+    figure.subplots_adjust(left / width, bottom / height, 1 - right / width, 1 - top / height)
     return figure, figure.subplots(rows, columns, squeeze=False, **options)
 
 
@@ -86,7 +93,7 @@ def _svg(figure: Any, alt: str) -> str:
     text = out.getvalue()
     text = text[text.index("<svg") :]
     text = re.sub(r"<metadata>.*?</metadata>", "", text, flags=re.S)
-    text = re.sub(r' id="[A-Za-z0-9]+_\d+"', "", text)
+    text = re.sub(r' id="[A-Za-z0-9.]+_\d+"', "", text)
     text = re.sub(r"<!--.*?-->", "", text, flags=re.S)
     text = re.sub(r' d="[^"]+"', lambda m: re.sub(r"(\.\d\d)\d+", r"\1", m.group(0)), text)
     size = re.search(r'viewBox="0 0 ([\d.]+) ([\d.]+)"', text)
@@ -96,11 +103,14 @@ def _svg(figure: Any, alt: str) -> str:
 
 
 def lobes(part: Lobes, fits: Sequence[tuple[int, str]], alt: str, salt: str) -> str:
-    """Luminance in the plane of incidence: all of it on a log scale, and the peak on a linear one. ``fits``: (row, label)."""
+    """Luminance in the plane of incidence: all on a log scale, the peak on a linear one. ``fits``: (row, label)."""
+    from matplotlib.ticker import NullLocator
+
     style = styles([label for _, label in fits])
     columns = len(part.theta_i)
     with _styled(salt):
-        figure, axes = _figure(10, 4.9, 2, columns, sharey="row" if columns > 1 else False)
+        figure, axes = _figure(10, 4.9, (0.6, 0.05, 0.45, 0.6), 2, columns)
+        figure.subplots_adjust(wspace=0.2, hspace=0.22)
         measured = luminance(part.measured)
         fitted = luminance(part.fitted)
         floor = _floor(measured)
@@ -115,6 +125,7 @@ def lobes(part: Lobes, fits: Sequence[tuple[int, str]], alt: str, salt: str) -> 
                 ax.axvline(angle, color="#999999", lw=0.5, zorder=0)
                 if row == 0:
                     ax.set_yscale("log")
+                    ax.yaxis.set_minor_locator(NullLocator())
                     ax.set_title(f"light at {angle:.3g}°")
                     ax.set_xlim(-90, 90)
                     ax.set_xticks([-60, -30, 0, 30, 60])
@@ -122,28 +133,36 @@ def lobes(part: Lobes, fits: Sequence[tuple[int, str]], alt: str, salt: str) -> 
                     ax.set_xlim(*zoom)
                     ax.set_xlabel("viewer θ$_o$, degrees")
         top = np.nanmax(np.where(np.isfinite(measured), measured, np.nan), initial=floor)
-        axes[0, 0].set_ylim(floor, 4 * max(top, np.nanpercentile(fitted[[m for m, _ in fits]], 99.9)))
+        for k in range(columns):
+            axes[0, k].set_ylim(floor, 5 * top)
+            if k:
+                axes[0, k].tick_params(labelleft=False)
+            peak = np.nanmax(measured[k], initial=0.0)
+            axes[1, k].set_ylim(0, 1.4 * peak if peak > 0 else None)
         axes[0, 0].set_ylabel("BRDF, 1/sr (log)")
-        axes[1, 0].set_ylim(0, 1.35 * top)
         axes[1, 0].set_ylabel("BRDF near the peak, 1/sr")
         handles, labels = axes[0, 0].get_legend_handles_labels()
-        figure.legend(handles, labels, loc="outside upper center", ncols=len(labels), handlelength=3)
+        figure.legend(handles, labels, loc="upper center", ncols=min(len(labels), 8), handlelength=3)
         return _svg(figure, alt)
 
 
 def channels(part: Lobes, row: int, names: Sequence[str], alt: str, salt: str) -> str:
     """Each channel of one fit in the plane of incidence, log scale."""
+    from matplotlib.ticker import NullLocator
+
     columns = len(part.theta_i)
     count = part.measured.shape[-1]
     colours = RGB if count == 3 else [f"C{c % 10}" for c in range(count)]
     with _styled(salt):
-        figure, axes = _figure(10, 2.7, 1, columns, sharey="row")
+        figure, axes = _figure(10, 2.7, (0.6, 0.05, 0.45, 0.3), 1, columns, sharey="row")
+        figure.subplots_adjust(wspace=0.08)
         for k, angle in enumerate(part.theta_i):
             ax = axes[0, k]
             for c in range(count):
                 ax.plot(part.theta_o[k], part.measured[k, :, c], color=colours[c], lw=3.0, alpha=0.28)
                 ax.plot(part.theta_o[k], part.fitted[row, k, :, c], color=colours[c], lw=1.0, label=names[c])
             ax.set_yscale("log")
+            ax.yaxis.set_minor_locator(NullLocator())
             ax.set_xlim(-90, 90)
             ax.set_xticks([-60, -30, 0, 30, 60])
             ax.set_title(f"light at {angle:.3g}°")
@@ -183,7 +202,10 @@ def maps(part: Maps, fits: Sequence[tuple[int, str]]) -> str:
     top = float(np.percentile(part.rms[rows][known], 98)) if known.any() else 1.0
     limit, top = max(limit, 1e-6), max(top, 1e-6)
     with matplotlib.rc_context({**_STYLE, "axes.grid": False}):
-        figure, axes = _figure(1.75 * max(len(rows), 2) + 1.2, 4.0, 2, len(rows), sharex=True, sharey=True)
+        columns = len(rows)
+        width = 1.72 * columns + 1.5
+        figure, axes = _figure(width, 4.0, (0.55, 0.95, 0.45, 0.3), 2, columns, sharex=True, sharey=True)
+        figure.subplots_adjust(wspace=0.1, hspace=0.12)
         ticks = np.array([0, 1, 5, 20, 45, 90])
         for k, (m, label) in enumerate(fits):
             for ax, data, name, low, high in (
@@ -197,8 +219,10 @@ def maps(part: Maps, fits: Sequence[tuple[int, str]]) -> str:
                 ax.set_facecolor("#d8d8d8")
                 ax.set_yticks(np.sqrt(ticks), [str(t) for t in ticks])
                 ax.set_xticks([0, 30, 60, 90])
-                if k == len(rows) - 1:
-                    bar = figure.colorbar(image, ax=ax if len(rows) == 1 else axes[0 if ax is axes[0, k] else 1, :], aspect=14)
+                if k == columns - 1:
+                    box = ax.get_position()
+                    place = figure.add_axes((1 - 0.85 / width, box.y0, 0.13 / width, box.height))
+                    bar = figure.colorbar(image, cax=place)
                     bar.set_label("mean residual" if ax is axes[0, k] else "RMS residual")
                     bar.outline.set_linewidth(0.4)
             axes[0, k].set_title(label)
@@ -265,13 +289,13 @@ def _uri(png: bytes) -> str:
     return "data:image/png;base64," + base64.b64encode(png).decode()
 
 
-def albedo(part: Albedo, fits: Sequence[tuple[int, str]], alt: str, salt: str) -> str:
-    """Directional albedo, the mean of the channels, over the angle of incidence."""
+def albedo(part: Albedo, fits: Sequence[tuple[int, str]], max_angle: float, alt: str, salt: str) -> str:
+    """Directional albedo, the mean of the channels, over the angle of incidence; the measured one up to ``max_angle``."""
     style = styles([label for _, label in fits])
     with _styled(salt):
-        figure, axes = _figure(5.2, 3.0)
+        figure, axes = _figure(5.2, 3.0, (0.55, 1.75, 0.45, 0.1))
         ax = axes[0, 0]
-        enough = part.covered > 0.98
+        enough = (part.covered > 0.98) & (part.theta_i <= max_angle + 1e-6)
         if enough.any():
             ax.plot(
                 part.theta_i[enough], part.measured[enough].mean(-1), color="#222222", lw=3.2, alpha=0.28, label="measured"
@@ -295,8 +319,8 @@ def albedo(part: Albedo, fits: Sequence[tuple[int, str]], alt: str, salt: str) -
         ax.set_xlim(0, 90)
         ax.set_xticks([0, 15, 30, 45, 60, 75, 90])
         ax.set_xlabel("light θ$_i$, degrees")
-        ax.set_ylabel("albedo ρ(θ$_i$)")
-        figure.legend(loc="outside right upper", handlelength=2.6)
+        ax.set_ylabel("albedo")
+        figure.legend(loc="upper right", handlelength=2.2)
         return _svg(figure, alt)
 
 
@@ -304,26 +328,19 @@ def tradeoff(points: Sequence[tuple[str, float, float]], limit: float, alt: str,
     """Error over the time of the solve; ``points`` are (label, seconds, error)."""
     style = styles([p[0] for p in points])
     with _styled(salt):
-        figure, axes = _figure(5.2, 3.0)
+        figure, axes = _figure(5.2, 3.0, (0.6, 0.1, 0.45, 0.1))
         ax = axes[0, 0]
         ax.set_xscale("log")
         ax.set_yscale("log")
         for label, time, error in points:
             ax.plot(time, error, marker=style[label]["marker"], color=style[label]["color"], ms=6, lw=0)
-            ax.annotate(label, (time, error), xytext=(6, 3), textcoords="offset points", color="#222222")
+            crowded = any(1 < t / time < 2.2 and 0.7 < e / error < 1.43 for n, t, e in points if n != label)
+            side, shift = ("right", -6) if crowded else ("left", 6)
+            ax.annotate(label, (time, error), xytext=(shift, 3), textcoords="offset points", ha=side, color="#222222")
         times, errors = np.array([p[1] for p in points]), np.array([p[2] for p in points])
-        ax.set_xlim(times.min() / 1.6, times.max() * 3.2)
+        ax.set_xlim(times.min() / 2.2, times.max() * 3.2)
         ax.set_ylim(min(errors.min(), limit) / 1.5, max(errors.max(), limit) * 1.6)
         ax.axhline(limit, color="#555555", lw=0.8, ls=(0, (2, 2)))
-        ax.annotate(
-            f"{limit:g}: hardly anyone sees a difference below",
-            (0.99, limit),
-            xycoords=("axes fraction", "data"),
-            ha="right",
-            va="bottom",
-            fontsize=7.5,
-            color="#555555",
-        )
         from matplotlib.ticker import FuncFormatter, LogLocator, NullFormatter
 
         for axis in (ax.xaxis, ax.yaxis):

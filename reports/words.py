@@ -7,22 +7,26 @@ from collections.abc import Iterable, Sequence
 
 import numpy as np
 
+NONE = "\u2013"
+"""Stands where there is no number."""
+
 SEEN = 0.012
 """Perceptual error up to which hardly anyone sees a difference (Lavoué et al. 2021, as recomputed in the project)."""
 
 GRADES: tuple[tuple[float, str], ...] = (
     (SEEN, "hardly anyone sees a difference"),
-    (2 * SEEN, "a difference that a careful eye may see side by side"),
+    (2 * SEEN, "seen by a careful eye, side by side"),
     (4 * SEEN, "a visible difference"),
-    (math.inf, "a plain difference: another material"),
+    (math.inf, "a plain difference"),
 )
 """Upper limits and words. Only the first limit is measured; the others are steps of two chosen here."""
 
 GRADES_NOTE = (
-    "The perceptual error is the RMS difference of cbrt(f cos θi cos θo), weighted with cos θo. On 358 pairs of published fits and "
-    "materials judged by 1005 people it ranks fits about as they do (rank correlation .65). At 0.012 or less, 90 % of pairs "
-    "are judged no farther from the material than near-exact approximations are: “hardly anyone sees a difference”. "
-    "That one limit is measured (with stand-ins for the materials); the words beyond it are steps of a factor of two, chosen here."
+    "The perceptual error is the RMS difference of cbrt(f cos θi cos θo), weighted with cos θo. On 358 pairs of published "
+    "fits and materials judged by 1005 people it ranks fits about as they do (rank correlation .65). At 0.012 or less, "
+    "90 % of pairs are judged no farther from the material than near-exact approximations are: “hardly anyone sees a "
+    "difference”. That one limit is measured (with stand-ins for the materials); the words beyond it are steps of a factor "
+    "of two, chosen here."
 )
 
 
@@ -47,7 +51,7 @@ def significant(x: float, digits: int = 3) -> str:
     """A number with so many significant digits; powers of ten beyond 1e-4 and 1e6."""
     x = float(x)
     if not math.isfinite(x):
-        return "–"
+        return NONE
     if x == 0:
         return "0"
     magnitude = math.floor(math.log10(abs(float(f"{x:.{digits - 1}e}"))))
@@ -83,7 +87,7 @@ def uncertain(value: float, sigma: float) -> str:
 def seconds(t: float) -> str:
     """A duration."""
     if not math.isfinite(t):
-        return "–"
+        return NONE
     if t < 0.001:
         return f"{significant(t * 1e6, 2)} µs"
     if t < 1:
@@ -93,13 +97,18 @@ def seconds(t: float) -> str:
 
 def percent(x: float) -> str:
     """A share."""
-    return f"{100 * x:.1f} %" if math.isfinite(x) else "–"
+    return f"{100 * x:.1f} %" if math.isfinite(x) else NONE
 
 
-def count(n: int, noun: str, plural: str = "") -> str:
-    """``1 start``, ``five models``: a number in words up to twelve, and its noun."""
-    words = "no one two three four five six seven eight nine ten eleven twelve".split()
-    return f"{words[n] if n < len(words) else thousands(n)} {noun if n == 1 else plural or noun + 's'}"
+def number(n: int) -> str:
+    """A count in words, up to twelve."""
+    words = ["no", "one", "two", "three", "four", "five", "six", "seven", "eight", "nine", "ten", "eleven", "twelve"]
+    return words[n] if n < len(words) else thousands(n)
+
+
+def count(n: int, noun: str) -> str:
+    """A count and its noun: ``one start``, ``five models``."""
+    return f"{number(n)} {noun if n == 1 else noun + 's'}"
 
 
 def listed(items: Iterable[str]) -> str:

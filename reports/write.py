@@ -42,9 +42,13 @@ def read_fits(out_dir: StrPath) -> tuple[list[Fit], dict[str, Any]]:
     except ValueError as fault:
         raise InputError(f"{path}: is not JSON ({fault}); fit again") from None
     if not isinstance(document, dict) or document.get("format") != FORMAT:
-        raise InputError(f"{path}: is not a brdfit fits file (its format is not {FORMAT!r}); name a directory that brdfit wrote")
+        raise InputError(
+            f"{path}: is not a brdfit fits file (its format is not {FORMAT!r}); name a directory that brdfit wrote"
+        )
     if document.get("version") != VERSION:
-        raise InputError(f"{path}: has version {document.get('version')!r}, this brdfit reads {VERSION}; update brdfit or fit again")
+        raise InputError(
+            f"{path}: has version {document.get('version')!r}, this brdfit reads {VERSION}; update brdfit or fit again"
+        )
     entries = document.get("fits")
     if not isinstance(entries, list):
         raise InputError(f"{path}: holds no list of fits; fit again")
@@ -60,9 +64,7 @@ def read_fits(out_dir: StrPath) -> tuple[list[Fit], dict[str, Any]]:
     return fits, environment if isinstance(environment, dict) else {}
 
 
-def write_report(
-    out_dir: StrPath, fits: Sequence[Fit], evidence: Sequence[Evidence], environment: dict[str, Any]
-) -> Path:
+def write_report(out_dir: StrPath, fits: Sequence[Fit], evidence: Sequence[Evidence], environment: dict[str, Any]) -> Path:
     """Write DIR/report.html: one file that needs no other and no network. The same input gives the same bytes."""
     from jinja2 import Environment, FileSystemLoader, StrictUndefined
 
