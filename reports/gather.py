@@ -6,6 +6,7 @@ shape of an argument costs a compilation that takes longer than the evaluation.
 
 from __future__ import annotations
 
+import hashlib
 from collections.abc import Sequence
 from typing import TYPE_CHECKING, Any
 
@@ -35,8 +36,14 @@ LIGHT = np.array([-0.45, 0.55, 0.704])
 
 
 def fit_key(fit: Fit) -> str:
-    """What tells the fits of one material apart: model, loss, measure and angle convention."""
-    return f"{fit.model_name}/{fit.loss}/{fit.measure}/{fit.angles}"
+    """What tells fits of one material apart: model, loss, measure, angle convention and a digest of the parameters.
+
+    The digest keeps evidence of an earlier fit from being shown for a later one.
+    """
+    digest = hashlib.sha256()
+    for name, value in sorted(fit.parameters.items()):
+        digest.update(name.encode() + np.ascontiguousarray(value, "<f8").tobytes())
+    return f"{fit.model_name}/{fit.loss}/{fit.measure}/{fit.angles}/{digest.hexdigest()[:12]}"
 
 
 def gather(table: Table, fits: Sequence[Fit]) -> Evidence:

@@ -109,7 +109,7 @@ def _section(number: int, fits: list[Fit], evidence: Evidence | None) -> View:
         "losses": _losses(*zip(*ranked, strict=True)),
         "physics": [_physics(f, label, evidence, rows) for f, label in ranked if f.parameters],
         "models": [_model(f, label, channel_names, salt) for f, label in ranked],
-        "missing": _missing(evidence),
+        "missing": _missing(evidence, [n for f, n in ranked if f.parameters and not _shows(f, rows)]),
         "overview": {label: (perceptual(f), f.converged) for f, label in zip(fits, names, strict=True)},
     }
 
@@ -508,7 +508,8 @@ def _bounds(f: Fit) -> tuple[list[str], list[str]]:
     from ..models import parameters_of
 
     valid = {p.name: (p.valid.lower, p.valid.upper) for p in parameters_of(f.model)} if f.model is not None else {}
-    limit, box = [], []
+    limit: list[str] = []
+    box: list[str] = []
     for text in f.at_bound:
         match = re.match(r"(\w+)(?:\[(\d+)\])?", text)
         name, index = (match.group(1), int(match.group(2) or 0)) if match else ("", 0)
@@ -526,13 +527,17 @@ def _time(f: Fit) -> str:
     return text + "." if text else ""
 
 
-def _missing(evidence: Evidence | None) -> list[str]:
+def _missing(evidence: Evidence | None, without: Sequence[str]) -> list[str]:
     if evidence is None:
         return [
             "The evidence of this fit (evidence.h5) is not here, so its lobe plots, residual maps, spheres and directional "
             "albedo are missing. Fit again from the table to have them."
         ]
     out = []
+    if without:
+        out.append(
+            f"the evidence kept here (evidence.h5) is not of the present fit of {words.listed(without)}, which is not drawn."
+        )
     for name, title in MISSING.items():
         if name in evidence.missing:
             out.append(
@@ -557,7 +562,8 @@ def _overview(sections: Sequence[View]) -> View:
         rows.append({"material": s["material"], "anchor": s["anchor"], "cells": cells, "best": best or "none"})
     wins = {n: sum(r["best"] == n for r in rows) for n in heads}
     best_line = ", ".join(f"{n} {c}" for n, c in sorted(wins.items(), key=lambda i: -i[1]) if c)
-    return {"heads": heads, "rows": rows, "wins": best_line}
+    doubts = any(c["doubt"] and c["text"] != "failed" for r in rows for c in r["cells"])
+    return {"heads": heads, "rows": rows, "wins": best_line, "doubts": doubts}
 
 
 def _references(fits: Sequence[Fit], evidence: Sequence[Evidence]) -> list[View]:

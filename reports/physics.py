@@ -100,7 +100,7 @@ def energy_verdict(rho: Reals, error: Reals, angles: tuple[float, ...] = ANGLES)
     over = np.flatnonzero(~(top <= 1 + np.maximum(error.max(1), 1e-6)))
     if len(over) == 0:
         k = int(np.argmax(top))
-        return f"conserves energy at every angle computed (at most {top[k]:.2f}, at {angles[k]:g}°)"
+        return f"conserves energy at every angle computed: at most {top[k]:.2f}, at {angles[k]:g}°"
     if not np.isfinite(top[over[0]]):
         return "albedo is not a number"
     worst = int(np.nanargmax(top))

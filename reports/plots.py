@@ -29,7 +29,7 @@ DASHES: tuple[Any, ...] = ("-", (0, (5, 1.5)), (0, (1.5, 1.2)), (0, (6, 1.5, 1.2
 MARKERS = "osD^vP*X"
 RGB = ("#B2182B", "#1B7837", "#2166AC")
 
-_STYLE = {
+_STYLE: dict[Any, Any] = {
     "font.size": 8.5,
     "font.family": "sans-serif",
     "axes.spines.top": False,
@@ -138,7 +138,8 @@ def lobes(part: Lobes, fits: Sequence[tuple[int, str]], alt: str, salt: str) -> 
             if k:
                 axes[0, k].tick_params(labelleft=False)
             peak = np.nanmax(measured[k], initial=0.0)
-            axes[1, k].set_ylim(0, 1.4 * peak if peak > 0 else None)
+            highest = np.nanmax(fitted[[m for m, _ in fits], k], initial=peak)
+            axes[1, k].set_ylim(0, 1.08 * min(highest, 3 * peak) if peak > 0 else None)
         axes[0, 0].set_ylabel("BRDF, 1/sr (log)")
         axes[1, 0].set_ylabel("BRDF near the peak, 1/sr")
         handles, labels = axes[0, 0].get_legend_handles_labels()

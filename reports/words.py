@@ -88,6 +88,8 @@ def seconds(t: float) -> str:
     """A duration."""
     if not math.isfinite(t):
         return NONE
+    if t == 0:
+        return "0 s"
     if t < 0.001:
         return f"{significant(t * 1e6, 2)} µs"
     if t < 1:

@@ -193,15 +193,15 @@ def test_f0_is_held_against_substances(report):
     assert "no parameter that is a reflectance" in text  # ward
 
 
-def test_same_input_same_bytes(tmp_path, measured, fits, report):
-    again = write_report(tmp_path, fits, [gather(measured, fits)], ENVIRONMENT).read_text()
-    assert again == report
-    other = write_report(tmp_path, fits, [gather(measured, fits)], {"when": "another day"}).read_text()
+def test_same_input_same_bytes(tmp_path, measured, fits, evidence, report):
+    once_more = gather(measured, fits)
+    assert write_report(tmp_path, fits, [once_more], ENVIRONMENT).read_text() == report
+    other = write_report(tmp_path, fits, [once_more], {"when": "another day"}).read_text()
     cut = re.compile(r'<section id="environment">.*?</section>', re.S)
     assert cut.sub("", other) == cut.sub("", report)
     assert other != report
-    first = save_evidence(tmp_path, [gather(measured, fits)]).read_bytes()
-    assert save_evidence(tmp_path, [gather(measured, fits)]).read_bytes() == first
+    first = save_evidence(tmp_path, [evidence]).read_bytes()
+    assert save_evidence(tmp_path, [once_more]).read_bytes() == first
 
 
 def test_nothing_is_left_beside_the_files(tmp_path, fits, evidence):
@@ -223,6 +223,12 @@ def test_without_evidence_the_report_says_what_is_missing(tmp_path, fits):
     text = Reader(rebuild_report(tmp_path).read_text()).text
     assert "evidence.h5) is not here, so its lobe plots, residual maps, spheres and directional albedo are missing" in text
     assert "Best of three for stuff: gtr" in text
+
+
+def test_evidence_of_an_earlier_fit_is_not_shown(tmp_path, fits, evidence):
+    later = replace(fits[0], parameters={**fits[0].parameters, "alpha": np.array(0.21)})
+    text = Reader(write_report(tmp_path, [later, *fits[1:]], [evidence], ENVIRONMENT).read_text()).text
+    assert "The evidence kept here (evidence.h5) is not of the present fit of ward, which is not drawn." in text
 
 
 def test_many_materials_begin_with_an_overview(tmp_path, fits, evidence):
