@@ -339,7 +339,7 @@ def tradeoff(points: Sequence[tuple[str, float, float]], limit: float, alt: str,
             side, shift = ("right", -6) if crowded else ("left", 6)
             ax.annotate(label, (time, error), xytext=(shift, 3), textcoords="offset points", ha=side, color="#222222")
         times, errors = np.array([p[1] for p in points]), np.array([p[2] for p in points])
-        ax.set_xlim(times.min() / 2.2, times.max() * 3.2)
+        ax.set_xlim(times.min() / 4, times.max() * 3.2)
         ax.set_ylim(min(errors.min(), limit) / 1.5, max(errors.max(), limit) * 1.6)
         ax.axhline(limit, color="#555555", lw=0.8, ls=(0, (2, 2)))
         from matplotlib.ticker import FuncFormatter, LogLocator, NullFormatter
