@@ -2,10 +2,11 @@
 
 from __future__ import annotations
 
-import contextlib
 import json
+import math
 from collections.abc import Sequence
 from pathlib import Path
+from tempfile import TemporaryFile
 from typing import TYPE_CHECKING, Any
 
 import click
@@ -25,9 +26,6 @@ def run(arguments: Sequence[str] | None = None) -> int:
     try:
         code = commands.main(args=None if arguments is None else list(arguments), prog_name="brdfit", standalone_mode=False)
         return int(code or OK)
-    except click.exceptions.NoArgsIsHelpError as fault:
-        click.echo(fault.format_message())
-        return WRONG_USE
     except click.ClickException as fault:
         where = fault.ctx.command_path if isinstance(fault, click.UsageError) and fault.ctx else "brdfit"
         click.echo(f"{where}: {' '.join(fault.format_message().split())} (see {where} --help)", err=True)
@@ -40,7 +38,13 @@ def run(arguments: Sequence[str] | None = None) -> int:
         return SOME_FAILED
 
 
-@click.group(context_settings={"help_option_names": ["-h", "--help"], "max_content_width": 100})
+def _finite(context: click.Context, option: click.Parameter, value: float) -> float:
+    if not math.isfinite(value):
+        raise click.BadParameter(f"{value} is not a number to use.", context, option)
+    return value
+
+
+@click.group(no_args_is_help=False, context_settings={"help_option_names": ["-h", "--help"], "max_content_width": 100})
 @click.version_option(package_name="brdfit")
 def commands() -> None:
     """Fit analytic reflectance models to measured BRDF tables.
@@ -54,20 +58,39 @@ def commands() -> None:
 @click.option("--model", "models", default=DEFAULT_MODELS, show_default=True, help="Models, separated by commas.")
 @click.option("--out", "out_dir", required=True, metavar="DIR", help="Where fits.json and report.html go.")
 @click.option("--loss", default="log", show_default=True, help="What is minimised; `brdfit models` lists the names.")
-@click.option("--measure", default="solid_angle", show_default=True, type=click.Choice(["solid_angle", "cells"]), help="What a cell counts by.")
-@click.option("--angles", default="edge", show_default=True, type=click.Choice(["edge", "centre"]), help="Where in a cell of a MERL file its value holds.")
-@click.option("--max-angle", default=80.0, show_default=True, type=click.FloatRange(0, 90, min_open=True, max_open=True), help="Largest polar angle fitted, degrees.")
-@click.option("--seed", default=0, show_default=True, help="Seed of random starts.")
-@click.option("--json", "as_json", is_flag=True, help="Print the records of fits.json on standard output.")
+@click.option(
+    "--measure",
+    default="solid_angle",
+    show_default=True,
+    type=click.Choice(["solid_angle", "cells"]),
+    help="What a cell counts by.",
+)
+@click.option(
+    "--angles",
+    default="edge",
+    show_default=True,
+    type=click.Choice(["edge", "centre"]),
+    help="Where in a cell of a MERL file its value holds.",
+)
+@click.option(
+    "--max-angle",
+    default=80.0,
+    show_default=True,
+    type=click.FloatRange(0, 90, min_open=True, max_open=True),
+    callback=_finite,
+    help="Largest polar angle fitted, degrees.",
+)
+@click.option("--seed", default=0, show_default=True, type=click.IntRange(0), help="Seed of random starts.")
+@click.option("--json", "as_json", is_flag=True, help="Print fits.json on standard output, and no progress.")
 @click.option("--report/--no-report", default=True, show_default=True, help="Write report.html.")
-@click.option("--quiet", is_flag=True, help="No progress and no table.")
+@click.option("--quiet", is_flag=True, help="Print nothing.")
 def fit_command(
     files: tuple[str, ...],
     models: str,
     out_dir: str,
     loss: str,
     measure: str,
-    angles: str,
+    angles: Any,
     max_angle: float,
     seed: int,
     as_json: bool,
@@ -76,10 +99,12 @@ def fit_command(
 ) -> int:
     """Fit every model to every FILE; writes DIR/fits.json and DIR/report.html."""
     from .progress import Progress
+    from .tables import load
 
-    names = [m.strip() for m in models.split(",") if m.strip()]
-    _check_names(names, loss)
-    tables = _checked(files, angles)
+    files = tuple(dict.fromkeys(files))
+    for path in files:  # nothing is fitted or written if one of them cannot be used
+        load(path, angles=angles)
+    names = _checked_names(models, loss)
     out = _writable(out_dir)
     _cache_programs()
 
@@ -90,25 +115,29 @@ def fit_command(
     fits: list[Fit] = []
     evidence: list[Evidence] = []
     where = environment()
+    interrupted = False
     with Progress(len(files) * len(names), silent=quiet or as_json) as progress:
-        for path in tables:
-            table = _load(path, angles)
-            progress.say(f"{table.material}: fitting {', '.join(names)}")
-            mine: list[Fit] = []
-            for f in fit_many([table], names, loss=loss, measure=measure, max_angle=max_angle, seed=seed):
-                mine.append(f)
-                progress.advance(_line(f))
-            mine.sort(key=lambda f: names.index(f.model_name))
-            fits += mine
-            write_fits(out, fits, where)
-            if report:
-                progress.say(f"{table.material}: drawing")
-                evidence.append(gather(table, mine))
-        if report:
+        try:
+            for path in files:
+                table = load(path, angles=angles)
+                progress.say(f"{table.material}: fitting")
+                first = len(fits)
+                for f in fit_many([table], names, loss=loss, measure=measure, max_angle=max_angle, seed=seed):
+                    fits[first:] = sorted([*fits[first:], f], key=lambda f: names.index(f.model_name))
+                    write_fits(out, fits, where)
+                    progress.advance(_line(f))
+                if report:
+                    progress.say(f"{table.material}: drawing")
+                    evidence.append(gather(table, fits[first:]))
+        except KeyboardInterrupt:
+            interrupted = True
+        if report and fits:
             save_evidence(out, evidence)
             write_report(out, fits, evidence, where)
+    if interrupted:
+        raise KeyboardInterrupt
     if as_json:
-        click.echo(json.dumps([f.record() for f in fits], indent=1))
+        click.echo((out / "fits.json").read_text(encoding="utf-8"), nl=False)
     elif not quiet:
         click.echo(f"report: {out / 'report.html'}" if report else f"fits: {out / 'fits.json'}")
     return OK if all(f.converged for f in fits) else SOME_FAILED
@@ -117,12 +146,24 @@ def fit_command(
 @commands.command("synth")
 @click.argument("names", nargs=-1, metavar="[NAME]...")
 @click.option("--out", "out_dir", metavar="DIR", help="Where the tables go.")
-@click.option("--seed", default=0, show_default=True, help="Seed of the noise.")
-@click.option("--noise", default=0.0, show_default=True, type=click.FloatRange(0), help="Relative noise, standard deviation.")
+@click.option("--seed", default=0, show_default=True, type=click.IntRange(0), help="Seed of the noise.")
+@click.option(
+    "--noise",
+    default=0.0,
+    show_default=True,
+    type=click.FloatRange(0),
+    callback=_finite,
+    help="Relative noise, standard deviation.",
+)
 @click.option("--list", "list_names", is_flag=True, help="List the materials and stop.")
 @click.option("--quiet", is_flag=True, help="Print nothing.")
-def synth_command(names: tuple[str, ...], out_dir: str | None, seed: int, noise: float, list_names: bool, quiet: bool) -> int:
-    """Write synthetic ground-truth tables: NAME.binary (MERL), NAME.h5 and their true parameters as NAME.json."""
+def synth_command(
+    names: tuple[str, ...], out_dir: str | None, seed: int, noise: float, list_names: bool, quiet: bool
+) -> int:
+    """Write synthetic ground-truth tables: NAME.binary (MERL), NAME.h5 and their true parameters as NAME.json.
+
+    Without a NAME, a few of each sort.
+    """
     from .data import synthetic
 
     if list_names:
@@ -130,7 +171,8 @@ def synth_command(names: tuple[str, ...], out_dir: str | None, seed: int, noise:
         return OK
     if out_dir is None:
         raise click.UsageError("Missing option '--out'.", click.get_current_context())
-    _cache_programs()
+    for name in names:  # nothing is written if one of them is unknown
+        synthetic.material(name)
     parts = [synthetic.Relative(noise)] if noise else []
     for path in synthetic.write(names, _writable(out_dir), noise=parts, seed=seed):
         if not quiet:
@@ -158,46 +200,32 @@ def models_command(as_json: bool) -> int:
     return OK
 
 
-def _check_names(models: list[str], loss: str) -> None:
+def _checked_names(models: str, loss: str) -> list[str]:
+    """The models of a list with commas, once each. Raises UsageError for an unknown name of a model or loss."""
     from .fitting.losses import LOSSES
     from .models import MODELS
 
-    for name in models:
-        if name not in MODELS:
-            raise click.UsageError(f"unknown model {name!r}: choose from {', '.join(MODELS)}", click.get_current_context())
-    if not models:
+    names = list(dict.fromkeys(m.strip() for m in models.split(",") if m.strip()))
+    if not names:
         raise click.UsageError("--model names no model", click.get_current_context())
-    if loss not in LOSSES:
-        raise click.UsageError(f"unknown loss {loss!r}: choose from {', '.join(LOSSES)}", click.get_current_context())
-
-
-def _load(path: str, angles: Any) -> Any:
-    from .tables import load
-
-    return load(path, angles=angles)
-
-
-def _checked(files: tuple[str, ...], angles: str) -> tuple[str, ...]:
-    """The files, each read once: nothing is fitted or written if one of them cannot be used."""
-    for path in files:
-        _load(path, angles)
-    return files
+    for kind, given, known in (("model", names, MODELS), ("loss", [loss], LOSSES)):
+        for name in given:
+            if name not in known:
+                raise click.UsageError(
+                    f"unknown {kind} {name!r}: choose from {', '.join(known)}", click.get_current_context()
+                )
+    return names
 
 
 def _writable(out_dir: str) -> Path:
     """The directory, made if need be. Raises InputError if nothing can be written there."""
-    from .files import replacing
-
     out = Path(out_dir)
     try:
         out.mkdir(parents=True, exist_ok=True)
+        with TemporaryFile(dir=out):
+            return out
     except OSError as fault:
-        raise InputError(f"{out_dir}: cannot be made a directory ({fault.strerror or fault}); choose another --out") from None
-    probe = out / ".brdfit-can-write"
-    with contextlib.suppress(FileNotFoundError), replacing(probe) as temporary:
-        temporary.touch()
-    probe.unlink(missing_ok=True)
-    return out
+        raise InputError(f"{out_dir}: cannot be written to ({fault.strerror or fault}); choose another --out") from None
 
 
 def _cache_programs() -> None:
@@ -212,10 +240,12 @@ def _cache_programs() -> None:
 
 
 def _line(f: Fit) -> str:
+    if f.model is None:
+        return f"{f.material}  {f.model_name}  FAILED: {f.reason}"
+    took = f"{f.seconds['prepare'] + f.seconds['solve']:.2f} s + {f.seconds['compile']:.2f} s compiling"
     verdict = "" if f.converged else f"  NOT CONVERGED: {f.reason}"
-    took = f.seconds["prepare"] + f.seconds["solve"]
-    return (
-        f"{f.material}  {f.model_name:18s} perceptual {f.errors['perceptual']:.4f}  {f.loss} {f.errors[f.loss]:.5f}"
-        f"  {took:.2f} s + {f.seconds['compile']:.2f} s compiling{verdict}"
-    )
+    errors = "  ".join(f"{name} {f.errors[name]:.5f}" for name in dict.fromkeys(("perceptual", f.loss)))
+    return f"{f.material}  {f.model_name:18s}{errors}  {took}{verdict}"
 
+
+__all__ = ["run"]
