@@ -49,7 +49,12 @@ def _results(
         for entry in tables:
             try:
                 table = entry if isinstance(entry, Table) else load(entry, angles=angles)  # type: ignore[arg-type]
-                prepare(table, options.get("max_angle", 80.0), options.get("measure", "solid_angle"))
+                prepare(
+                    table,
+                    options.get("max_angle", 80.0),
+                    options.get("measure", "solid_angle"),
+                    named_loss(options.get("loss", "log")),
+                )
             except InputError as fault:
                 for m in models:
                     yield failed(Path(os.fspath(entry)).stem, m, str(fault), options)  # type: ignore[arg-type]

@@ -45,6 +45,8 @@ class Part:
     unknown: NDArray[np.bool_]
     """Rows of parameters that the data do not determine."""
     bounded: list[tuple[str, int | None]]
+    shift: float
+    """Standard errors by which one exact Gauss-Newton step over all cells would move the parameter it moves most."""
 
 
 @dataclass(frozen=True)
@@ -83,6 +85,7 @@ def estimate_of(problem: Problem, minimum: Minimum, box: Box) -> Part:
         jacobian @ u.jackknife @ jacobian.T,
         (np.abs(jacobian) * u.undetermined).sum(1) > 0,
         [(c.parameter, k) for i, (c, k) in enumerate(order) if free[i] and (at_lower[i] or at_upper[i])],
+        u.shift,
     )
 
 

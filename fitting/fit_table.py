@@ -5,6 +5,7 @@ from __future__ import annotations
 import threading
 import time
 from collections.abc import Mapping
+from dataclasses import dataclass, replace
 from typing import Any
 from weakref import WeakKeyDictionary
 
@@ -18,12 +19,12 @@ from numpy.typing import NDArray
 from ..models import BRDF, channels, parameter_values, parameters_of, variants
 from ..tables import Table
 from .coordinates import Chart, charts
-from .estimate import combine, estimate_of
-from .gram import Problem, loss_errors
+from .estimate import Part, combine, estimate_of
+from .gram import Problem, Span, loss_errors
 from .losses import LOSSES, Loss, LossFunction, named_loss
 from .result import Fit, Named, Optimum
-from .samples import Samples, samples
-from .search import Found, search
+from .samples import Samples, compress, samples
+from .search import Found, Stage, search, solve
 from .solver import Box
 from .starts import Summary, starts, summarise
 from .timing import compilation
@@ -33,26 +34,39 @@ Model = str | BRDF | type[BRDF]
 OPTIMAL = 1e-4
 """Cosine between residual and Jacobian below which a point counts as a first-order optimum: moving there would lower the
 error by less than half the square of it, 5e-9 relative."""
+TOLERATED = 0.1
+"""Standard errors by which compression of the table may move a parameter."""
 EXACT = 1e-9
 """Error below which a fit is exact to rounding."""
 
 _errors = eqx.filter_jit(loss_errors)
 
-_prepared: WeakKeyDictionary[Table, dict[Any, tuple[Samples, NDArray[np.bool_], Summary]]] = WeakKeyDictionary()
+@dataclass(frozen=True)
+class Prepared:
+    """A table made ready for fits under one loss."""
+
+    samples: Samples
+    used: NDArray[np.bool_]
+    """Which cells are fitted."""
+    summary: Summary
+    loss: Loss
+    """The loss, bound to the table."""
 
 
+_prepared: WeakKeyDictionary[Table, dict[Any, Prepared]] = WeakKeyDictionary()
 _preparing = threading.Lock()
 
 
-def prepare(table: Table, max_angle: float, measure: str) -> tuple[Samples, NDArray[np.bool_], Summary]:
+def prepare(table: Table, max_angle: float = 80.0, measure: str = "solid_angle", loss: Loss = LOSSES["log"]) -> Prepared:
     """Blocks, fitted cells and summary of a table, kept for the next model fitted to it."""
-    key = (max_angle, measure)
+    key = (max_angle, measure, loss)
     with jax.enable_x64(True), _preparing:
         kept = _prepared.setdefault(table, {})
         if key not in kept:
-            blocks, used = samples(table, max_angle, measure)
+            cells, used = samples(table, max_angle, measure)
+            bound = loss.bind(table.planes[:, used])
             kept.clear()
-            kept[key] = blocks, used, summarise(table, used)
+            kept[key] = Prepared(compress(cells, table, used, max_angle, bound), used, summarise(table, used), bound)
         return kept[key]
 
 
@@ -105,17 +119,16 @@ def fit(
         ValueError: Unknown model, loss, measure or parameter name, or a value out of range.
         TypeError: A model or loss that is neither a name nor the right kind of object.
     """
-    bound_loss = named_loss(loss)
+    named_loss(loss)
     cls = model_class(model, (not table.isotropic) if anisotropic is None else anisotropic)
     fixed = {n: np.asarray(v, float) for n, v in (fixed or {}).items()}
     given = _given_start(cls, model, start)
     _check_names(cls, {**fixed, **given, **dict(bounds or {})})
     begin = time.perf_counter()
     with jax.enable_x64(True), compilation() as compiled:
-        blocks, used, summary = prepare(table, max_angle, measure)
+        ready = prepare(table, max_angle, measure, named_loss(loss))
+        used, bound_loss = ready.used, ready.loss
         prepared = time.perf_counter()
-        values = table.planes[:, used]
-        bound_loss = bound_loss.bind(values)
         frame: dict[str, Any] = {
             "material": table.material,
             "source": table.source,
@@ -133,15 +146,16 @@ def fit(
             return _nothing(frame, reason, {"load": table.seconds, "prepare": prepared - begin, "compile": 0.0, "solve": 0.0})
         box = tuple(sorted((n, float(a), float(b)) for n, (a, b) in (bounds or {}).items()))
         forms = charts(cls, bool(fixed), box)
-        proposals = list(starts(cls, summary, seed))
+        proposals = list(starts(cls, ready.summary, seed))
         if given:
             proposals.insert(0, {**proposals[0], **_per_channel(cls, given, table.channels)})
         proposals = [{**p, **_per_channel(cls, fixed, table.channels)} for p in proposals]
-        found = _search(forms, blocks, bound_loss, proposals, frozenset(fixed))
-        estimate = combine(cls, [estimate_of(f.problem, f.minimum, f.box) for f in found])
-        named = _named_losses(values, bound_loss)
+        ended = [settle(f) for f in _search(forms, ready.samples, bound_loss, proposals, frozenset(fixed))]
+        found = [f for f, _ in ended]
+        estimate = combine(cls, [part for _, part in ended])
+        named = _named_losses(table.planes[:, used], bound_loss)
         fitted = cls(**estimate.parameters)
-        errors = np.asarray(_errors(fitted, blocks, named))
+        errors = np.asarray(_errors(fitted, ready.samples, named))
     converged, reason = _verdict(found)
     solve = time.perf_counter() - prepared - compiled.seconds
     return Fit(
@@ -160,7 +174,24 @@ def fit(
         starts=found[0].starts,
         optima=_scaled(found, float(errors[[e.name for e in named].index(bound_loss.name)])),
         passes=max(f.passes for f in found),
+        path="exact" if any(f.exact for f in found) else "compressed",
+        shift=max(part.shift for _, part in ended),
     )
+
+
+def settle(found: Found) -> tuple[Found, Part]:
+    """Error bars of an optimum, after the whole table agreed to it.
+
+    An optimum of the compressed table stands if the cells themselves, asked with one exact Gauss-Newton step, would move
+    no parameter by more than :data:`TOLERATED` standard errors. Otherwise the search ends on the cells.
+    """
+    part = estimate_of(found.problem, found.minimum, found.box)
+    if found.exact or part.shift <= TOLERATED:
+        return replace(found, passes=found.passes + 1), part
+    stage = Stage.of(Span.cells(found.problem.samples), 1e-9, 1e-6)
+    end = solve(found.problem, found.minimum.x, found.box, stage)
+    found = replace(found, minimum=end, passes=found.passes + int(end.steps) + 2, exact=True)
+    return found, estimate_of(found.problem, end, found.box)
 
 
 def evaluate(
@@ -176,9 +207,9 @@ def evaluate(
     if channels(model) not in (1, table.channels):
         raise ValueError(f"the model has {channels(model)} channels and the table {table.channels}")
     with jax.enable_x64(True):
-        blocks, used, _ = prepare(table, max_angle, measure)
-        named = _named_losses(table.planes[:, used], None if loss is None else named_loss(loss))
-        values = np.asarray(_errors(model, blocks, named))
+        ready = prepare(table, max_angle, measure)
+        named = _named_losses(table.planes[:, ready.used], None if loss is None else named_loss(loss))
+        values = np.asarray(_errors(model, ready.samples, named))
     return {e.name: float(v) for e, v in zip(named, values, strict=True)}
 
 
@@ -272,7 +303,7 @@ def _verdict(found: list[Found]) -> tuple[bool, str]:
         return False, f"stopped at the limit of {steps} steps; the gradient is still {cosine:.1g} (cosine to the residual)"
     if cosine > OPTIMAL:
         return False, f"stalled after {steps} steps: no step lowers the error, but the gradient is {cosine:.1g}, not 0"
-    return True, f"at a minimum: the last step changed the cost by less than 1e-8 of itself, gradient {cosine:.1g}"
+    return True, f"at a minimum: the last step changed the cost by less than 1e-9 of itself, gradient {cosine:.1g}"
 
 
 def failed(material: str, model: Model, reason: str, options: Mapping[str, Any]) -> Fit:

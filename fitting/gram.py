@@ -192,18 +192,35 @@ def _scatter(problem: Problem, per_channel: Float[Array, "C ... k k"]) -> Float[
     return out
 
 
-def _sum_over_blocks(samples: Samples, blocks: Array | int, one: Callable[[Geometry, Array, Array], Any]) -> Any:
-    """Sum of ``one(geometry, measured, weight)``, a pytree of arrays, over the first ``blocks`` blocks."""
+class Span(eqx.Module):
+    """The blocks that a pass visits: ``count`` of them from ``first``. Compressed blocks come before those of cells."""
+
+    first: Array
+    count: Array
+
+    @staticmethod
+    def cells(samples: Samples, count: int | None = None) -> Span:
+        """The first ``count`` blocks of cells; all of them by default."""
+        return Span(jnp.asarray(samples.compressed), jnp.asarray(min(count or samples.blocks, samples.blocks)))
+
+    @staticmethod
+    def nodes(samples: Samples, count: int | None = None) -> Span:
+        """The first ``count`` compressed blocks; all of them by default."""
+        return Span(jnp.asarray(0), jnp.asarray(min(count or samples.compressed, samples.compressed)))
+
+
+def _sum_over_blocks(samples: Samples, span: Span, one: Callable[[Geometry, Array, Array], Any]) -> Any:
+    """Sum of ``one(geometry, measured, weight)``, a pytree of arrays, over a span of blocks."""
 
     def step(i: Array, total: Any) -> Any:
         return jax.tree.map(jnp.add, total, one(*samples.block(i)))
 
     shapes = jax.eval_shape(lambda: one(*samples.block(jnp.zeros((), int))))
-    return jax.lax.fori_loop(0, blocks, step, jax.tree.map(lambda s: jnp.zeros(s.shape, s.dtype), shapes))
+    return jax.lax.fori_loop(span.first, span.first + span.count, step, jax.tree.map(lambda s: jnp.zeros(s.shape, s.dtype), shapes))
 
 
-def gram(problem: Problem, x: Vector, blocks: Array) -> Float[Array, "n+1 n+1"]:
-    """G = [J r]^T [J r] over the first ``blocks`` blocks; its last element is the cost."""
+def gram(problem: Problem, x: Vector, span: Span) -> Float[Array, "n+1 n+1"]:
+    """G = [J r]^T [J r] over a span of blocks; its last element is the cost, with what compression left out."""
     tables = polar_tables(problem, x)
 
     def one(g: Geometry, measured: Array, weight: Array) -> Array:
@@ -211,8 +228,13 @@ def gram(problem: Problem, x: Vector, blocks: Array) -> Float[Array, "n+1 n+1"]:
             return jax.vmap(_products)(channel_rows(problem, x, tables, g, measured, weight))
         return _products(joint_rows(problem, x, tables, g, measured, weight))
 
-    total: Array = _sum_over_blocks(problem.samples, blocks, one)
-    return _scatter(problem, total) if problem.loss.separable else total
+    total: Array = _sum_over_blocks(problem.samples, span, one)
+    if problem.loss.separable:
+        total = _scatter(problem, total)
+    if problem.samples.compressed:
+        share = jnp.clip(problem.samples.compressed - span.first, 0, span.count) / problem.samples.compressed
+        total = total.at[-1, -1].add(share * jnp.sum(problem.samples.remainder))
+    return total
 
 
 def statistics(problem: Problem, x: Vector) -> tuple[Float[Array, "... n+1 n+1"], Float[Array, "n n"]]:
@@ -234,7 +256,7 @@ def statistics(problem: Problem, x: Vector) -> tuple[Float[Array, "... n+1 n+1"]
         s = jnp.sum(rows[:-1] * rows[-1:], 1).reshape(n, -1)
         return jnp.sum(jax.vmap(lambda r: _band_products(r, problem.samples), in_axes=1)(rows), 0), s @ s.T
 
-    grams, middle = _sum_over_blocks(problem.samples, problem.samples.blocks, one)
+    grams, middle = _sum_over_blocks(problem.samples, Span.cells(problem.samples), one)
     return (_scatter(problem, grams) if problem.loss.separable else grams), middle
 
 
@@ -250,7 +272,7 @@ def factor(g: Float[Array, "m m"]) -> Float[Array, "m m"]:
     return jnp.sqrt(jnp.maximum(values, 0.0))[:, None] * vectors.T * scale
 
 
-def gram_residual(problem: Problem, blocks: Array) -> Callable[[Vector], Array]:
+def gram_residual(problem: Problem, span: Span) -> Callable[[Vector], Array]:
     """The table as a residual of n + 1 rows with an exact Jacobian.
 
     A trial point where the residual is not a number (1 + f cos <= 0 under ``log``) has infinite cost: it is rejected, and
@@ -258,7 +280,7 @@ def gram_residual(problem: Problem, blocks: Array) -> Callable[[Vector], Array]:
     """
 
     def whiten(x: Vector) -> Array:
-        g = gram(problem, x, blocks)
+        g = gram(problem, x, span)
         ok = jnp.all(jnp.isfinite(g))
         g = jnp.where(ok, g, jnp.eye(g.shape[0]))
         return jnp.where(ok, 1.0, 1e150) * factor(g)
@@ -292,5 +314,5 @@ def loss_errors(model: Any, samples: Samples, losses: tuple[Loss, ...]) -> Float
             out.append(jnp.stack([jnp.sum(w * r**2), jnp.sum(w) * r.shape[-1]]))
         return jnp.stack(out)
 
-    sums = _sum_over_blocks(samples, samples.blocks, one)
+    sums = _sum_over_blocks(samples, Span.cells(samples), one)
     return jnp.sqrt(sums[:, 0] / sums[:, 1])

@@ -30,6 +30,10 @@ class Loss(eqx.Module):
     function: LossFunction = eqx.field(static=True)
     weigh: Callable[[Geometry], Array] | None = eqx.field(static=True, default=None)
     """Weight relative to the table's measure; None for 1."""
+    transform: Callable[[Array, Geometry], Array] | None = eqx.field(static=True, default=None)
+    """T with residual T(f) - T(m), on values ``[C, ...]`` that the geometry broadcasts to; None where the loss has no such form."""
+    inverse: Callable[[Array, Geometry], Array] | None = eqx.field(static=True, default=None)
+    """The value f of T(f)."""
     separable: bool = eqx.field(static=True, default=True)
     """Whether the residual of a channel depends on that channel alone, which lets channels be fitted one by one."""
 
@@ -112,16 +116,21 @@ def _cos_o(g: Geometry) -> Array:
     return g.cos_o
 
 
+_LOG = (lambda f, g: jnp.log1p(f * g.cos_i), lambda t, g: jnp.expm1(t) / g.cos_i)
+_NGAN = (lambda f, g: f * g.cos_i, lambda t, g: t / g.cos_i)
+_CUBEROOT = (lambda f, g: _cbrt(f * g.cos_i), lambda t, g: t**3 / g.cos_i)
+_PERCEPTUAL = (lambda f, g: _cbrt(f * (g.cos_i * g.cos_o)), lambda t, g: t**3 / (g.cos_i * g.cos_o))
+
 LOSSES: dict[str, Loss] = {
     loss.name: loss
     for loss in (
-        Loss("log", "low2012", _log),
-        Loss("low", "low2012", _log, _uniform_theta_o),
-        Loss("bieron", "bieron2020", _log, _cos_o),
-        Loss("ngan", "ngan2005", _ngan),
-        Loss("cuberoot", "fores2012", _cuberoot),
+        Loss("log", "low2012", _log, None, *_LOG),
+        Loss("low", "low2012", _log, _uniform_theta_o, *_LOG),
+        Loss("bieron", "bieron2020", _log, _cos_o, *_LOG),
+        Loss("ngan", "ngan2005", _ngan, None, *_NGAN),
+        Loss("cuberoot", "fores2012", _cuberoot, None, *_CUBEROOT),
         Relative("relative", "brdfit", _relative),
-        Loss("perceptual", "lavoue2021", _perceptual, _cos_o),
+        Loss("perceptual", "lavoue2021", _perceptual, _cos_o, *_PERCEPTUAL),
     )
 }
 """Every named loss, in the order reports show them."""

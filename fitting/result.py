@@ -72,7 +72,10 @@ class Fit:
     passes: int = 0
     """Passes over the whole table."""
     path: str = "exact"
-    """How the residuals were evaluated: every cell ("exact")."""
+    """Which residuals the optimum is one of: of every cell (``exact``), or of rows along phi_d compressed to a few nodes
+    each (``compressed``), to which the cells then agreed."""
+    shift: float = 0.0
+    """Standard errors by which one more exact step over all cells would move the parameter that it moves most."""
 
     def strong_correlations(self, threshold: float = 0.95) -> list[tuple[str, str, float]]:
         """Pairs of parameters whose estimates are correlated beyond ``threshold``, strongest first."""
@@ -122,6 +125,7 @@ class Fit:
             "optima": [{"error": _plain(o.error), "starts": o.starts} for o in self.optima],
             "passes": self.passes,
             "path": self.path,
+            "shift": _plain(self.shift),
         }
 
 
@@ -160,6 +164,7 @@ def from_record(record: dict[str, Any]) -> Fit:
         optima=tuple(Optimum(float("nan") if o["error"] is None else o["error"], o["starts"]) for o in record.get("optima", [])),
         passes=record.get("passes", 0),
         path=record.get("path", "exact"),
+        shift=record.get("shift") or 0.0,
     )
 
 

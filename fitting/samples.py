@@ -17,9 +17,12 @@ import numpy as np
 from jaxtyping import Array, Float
 from numpy.typing import NDArray
 
+from ..angles import polar_cosines
 from ..geometry import Geometry, from_directions
 from ..polar import PolarStencil
 from ..tables import HalfDifferenceGrid, Table
+from .compression import row_rule
+from .losses import Loss
 
 Reals = NDArray[np.float64]
 
@@ -33,7 +36,11 @@ SCATTERED_CELLS = 8160
 
 
 class Samples(eqx.Module):
-    """The fitted cells of a table. A leaf of ``geometry`` with a leading axis of 1 is shared by all blocks."""
+    """The fitted cells of a table, and before them a compressed copy where there is one.
+
+    A leaf of ``geometry`` with a leading axis of 1 is shared by all blocks. The first ``compressed`` blocks are the table
+    with its rows along phi_d compressed for one loss; the others are its cells.
+    """
 
     geometry: Geometry
     measured: Float[Array, "blocks C *cells"]
@@ -44,11 +51,15 @@ class Samples(eqx.Module):
     """Shape that unfolds ``cells`` so that each angular band of the jackknife has its own index."""
     band_axes: tuple[int, ...] = eqx.field(static=True)
     """Axes of ``banded`` that number the bands; the others lie within one."""
+    remainder: Float[Array, "C"]
+    """What the compressed blocks leave out of the cost, a constant."""
+    compressed: int = eqx.field(static=True, default=0)
+    """Number of compressed blocks."""
 
     @property
     def blocks(self) -> int:
-        """Number of blocks."""
-        return self.measured.shape[0]
+        """Number of blocks of cells."""
+        return self.measured.shape[0] - self.compressed
 
     def block(self, i: Array) -> tuple[Geometry, Float[Array, "C *cells"], Float[Array, "*cells"]]:
         """Geometry, measured values and weights of block i."""
@@ -57,7 +68,8 @@ class Samples(eqx.Module):
 
     def channel(self, c: int) -> Samples:
         """The same cells with channel c alone."""
-        return eqx.tree_at(lambda s: s.measured, self, self.measured[:, c : c + 1])
+        part = slice(c, c + 1)
+        return eqx.tree_at(lambda s: (s.measured, s.remainder), self, (self.measured[:, part], self.remainder[part]))
 
 
 def samples(table: Table, max_angle: float, measure: str) -> tuple[Samples, NDArray[np.bool_]]:
@@ -97,7 +109,7 @@ class _Fold:
     """
 
     def __init__(self, shape: tuple[int, ...]) -> None:
-        h, d, p = shape
+        h, d, p = self.shape = shape
         bands = min(THETA_H_BANDS, h)
         rows = -(-h // bands)
         self.steps = -(-d // STRIDED), -(-p // STRIDED)
@@ -120,13 +132,85 @@ class _Fold:
         a = np.moveaxis(a, (-3, -1), (0, 1)).reshape(step_d * step_p, *a.shape[:-4], d * p)
         return jnp.asarray(a[self.order])
 
+    def unfold(self, blocks: np.ndarray) -> np.ndarray:
+        """``[H, D, P]`` of blocks ``[B, H, D' P']``."""
+        h, depth, p = self.shape
+        (step_d, step_p), (_, _, d, q) = self.steps, self.banded
+        a = np.empty_like(blocks)
+        a[self.order] = blocks
+        a = np.moveaxis(a.reshape(step_d, step_p, -1, d, q), (0, 1), (2, 4))
+        return a.reshape(a.shape[0], d * step_d, q * step_p)[:h, :depth, :p]
+
 
 def _grid_samples(table: Table, grid: HalfDifferenceGrid, used: NDArray[np.bool_], weight: Reals, limit: float) -> Samples:
     geometry, (h, d) = _grid_geometry(grid.theta_h.tobytes(), grid.theta_d.tobytes(), grid.phi_d.tobytes(), limit)
     part = np.ix_(h, d)
     fold = _Fold((len(h), len(d), len(grid.phi_d)))
     measured = np.where(used[part], table.planes[(slice(None), *part)], 0.0)
-    return Samples(geometry, fold(measured), fold(weight[part]), banded=fold.banded, band_axes=(0, 2))
+    none = jnp.zeros(table.channels)
+    return Samples(geometry, fold(measured), fold(weight[part]), banded=fold.banded, band_axes=(0, 2), remainder=none)
+
+
+def compress(cells: Samples, table: Table, used: NDArray[np.bool_], max_angle: float, loss: Loss) -> Samples:
+    """The samples with a compressed copy of the table before them, made for one loss (bound to the table).
+
+    The same samples where that is not possible: scattered samples, short rows, losses without a transform.
+    """
+    grid = table.layout
+    if loss.transform is None or not isinstance(grid, HalfDifferenceGrid) or not grid.isotropic:
+        return cells
+    limit = float(np.radians(max_angle))
+    geometry, rows = _grid_geometry(grid.theta_h.tobytes(), grid.theta_d.tobytes(), grid.phi_d.tobytes(), limit)
+    part = np.ix_(*rows)
+    fold = _Fold((*(len(r) for r in rows), len(grid.phi_d)))
+    k = fold.banded[3]
+    if len(grid.phi_d) < 2 * k:
+        return cells
+    h, d = grid.theta_h[rows[0], None, None], grid.theta_d[None, rows[1], None]
+    weight = np.asarray(fold.unfold(np.asarray(cells.weight)))
+    at_cells = _plain_geometry(h, d, grid.phi_d, weight > 0)
+    relative = loss.weight(at_cells)
+    weight = weight if relative is None else weight * np.asarray(relative)
+    rule = row_rule(np.where(grid.phi_d > np.pi, 2 * np.pi - grid.phi_d, grid.phi_d), weight, k)
+    planes = np.where(used[part], table.planes[(slice(None), *part)], 0.0)
+    transformed = np.asarray(loss.transform(jnp.asarray(planes), at_cells))
+    coefficients = rule.project(transformed)
+    remainder = (weight * transformed**2).sum((1, 2, 3)) - (coefficients**2).sum((1, 2, 3))
+    at_nodes = _plain_geometry(h, d, rule.phi, rule.weight > 0)
+    assert loss.inverse is not None  # a transform comes with its inverse
+    values = np.asarray(loss.inverse(jnp.asarray(rule.at_nodes(coefficients)), at_nodes))
+    relative = loss.weight(at_nodes)
+    node_weight = rule.weight if relative is None else rule.weight / np.asarray(relative)
+    nodes = _Fold((*(len(r) for r in rows), k))
+
+    def before(first: np.ndarray, leaf: Array, fill: float = 0.0) -> Array:
+        return jnp.concatenate([nodes(first, fill), leaf])
+
+    def stencil(cosine: Array, leaf: PolarStencil | None) -> PolarStencil:
+        assert leaf is not None
+        s = PolarStencil.of(np.asarray(cosine), limit)
+        return PolarStencil(before(np.asarray(s.index), leaf.index, 1), before(np.asarray(s.fraction), leaf.fraction), limit)
+
+    joined = Geometry(
+        cos_i=before(np.asarray(at_nodes.cos_i), geometry.cos_i, 1.0),
+        cos_o=before(np.asarray(at_nodes.cos_o), geometry.cos_o, 1.0),
+        cos_h=geometry.cos_h,
+        sin2_h=geometry.sin2_h,
+        cos_d=before(np.asarray(at_nodes.cos_d), geometry.cos_d, 1.0),
+        sin2_d=before(np.asarray(at_nodes.sin2_d), geometry.sin2_d),
+        stencil_i=stencil(at_nodes.cos_i, geometry.stencil_i),
+        stencil_o=stencil(at_nodes.cos_o, geometry.stencil_o),
+    )
+    measured, share = before(values, cells.measured), before(node_weight, cells.weight)
+    count = share.shape[0] - cells.weight.shape[0]
+    left = jnp.asarray(np.maximum(remainder, 0.0))
+    return Samples(joined, measured, share, cells.banded, cells.band_axes, left, compressed=count)
+
+
+def _plain_geometry(h: Reals, d: Reals, phi: Reals, fitted: NDArray[np.bool_]) -> Geometry:
+    """Geometry of half/difference angles; where not fitted, of the normal direction."""
+    cos_i, cos_o = (jnp.asarray(np.where(fitted, c, 1.0)) for c in polar_cosines(h, d, phi))
+    return Geometry(cos_i, cos_o, *(jnp.asarray(a) for a in (np.cos(h), np.sin(h) ** 2, np.cos(d), np.sin(d) ** 2)))
 
 
 @lru_cache(maxsize=1)
@@ -181,7 +265,8 @@ def _scattered_samples(table: Table, used: NDArray[np.bool_], weight: Reals, lim
     g = eqx.tree_at(lambda q: (q.stencil_i, q.stencil_o), g, tuple(stencils), is_leaf=lambda x: x is None)
     measured = np.moveaxis(np.where(fitted, values[:, slots], 0.0), 0, 1)
     kept = jnp.asarray(np.where(fitted, share[slots], 0.0))
-    return Samples(jax.tree.map(jnp.asarray, g), jnp.asarray(measured), kept, banded=banded, band_axes=(0,))
+    none = jnp.zeros(table.channels)
+    return Samples(jax.tree.map(jnp.asarray, g), jnp.asarray(measured), kept, banded, (0,), none)
 
 
 def _band_slots(wi: Reals, wo: Reals) -> NDArray[np.int64]:

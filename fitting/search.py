@@ -10,14 +10,14 @@ import numpy as np
 from jaxtyping import Array
 from numpy.typing import NDArray
 
-from .gram import Problem, gram_residual
+from .gram import Problem, Span, gram_residual
 from .result import Optimum
 from .solver import Box, Minimum, minimise
 
-COLOUR_BLOCKS = 2
-"""Blocks of the table for refitting the linear coordinates alone."""
-COARSE_BLOCKS = 6
-"""Blocks of the table for polishing the best shapes."""
+COLOUR_BLOCKS = (2, 1)
+"""Blocks of cells, and compressed blocks, for refitting the linear coordinates alone."""
+COARSE_BLOCKS = (6, 3)
+"""Blocks of cells, and compressed blocks, for polishing the best shapes."""
 POLISHED = 7
 """Starts that are polished on the coarse table, besides the best one of each further chart."""
 FINISHED = 3
@@ -32,20 +32,20 @@ MAX_STEPS = 300
 class Stage(eqx.Module):
     """How much of the table a search looks at, when it stops, and how careful its first step is."""
 
-    blocks: Array
+    span: Span
     rtol: Array
     damping: Array
 
     @staticmethod
-    def of(blocks: int, rtol: float, damping: float) -> Stage:
+    def of(span: Span, rtol: float, damping: float) -> Stage:
         """A stage, its numbers as arguments of the compiled program."""
-        return Stage(jnp.asarray(blocks), jnp.asarray(rtol), jnp.asarray(damping))
+        return Stage(span, jnp.asarray(rtol), jnp.asarray(damping))
 
 
 @eqx.filter_jit
 def solve(problem: Problem, x: Array, box: Box, stage: Stage) -> Minimum:
     """Minimise from x. One program for coarse and whole tables and for any bounds."""
-    return minimise(gram_residual(problem, stage.blocks), x, box, stage.rtol, stage.damping, MAX_STEPS)
+    return minimise(gram_residual(problem, stage.span), x, box, stage.rtol, stage.damping, MAX_STEPS)
 
 
 @dataclass(frozen=True)
@@ -58,6 +58,9 @@ class Found:
     starts: int
     optima: tuple[Optimum, ...]
     passes: int
+    """Passes over the whole table."""
+    exact: bool
+    """Whether the minimum is one of the cells themselves, not of the compressed table."""
 
 
 def _varied(ranked: list[tuple[float, Problem, Box, Minimum]]) -> list[tuple[float, Problem, Box, Minimum]]:
@@ -81,10 +84,12 @@ def search(problems: list[tuple[Problem, Box, list[NDArray[np.float64]]]]) -> Fo
     Every start gets its linear coordinates refitted on a coarse table; the best shapes are then polished there, all
     coordinates free, and the distinct optima among them on the whole table.
     """
-    total = problems[0][0].samples.blocks
-    colour = Stage.of(min(total, COLOUR_BLOCKS), 1e-2, 1e-2)
-    coarse = Stage.of(min(total, COARSE_BLOCKS), 1e-6, 1.0)
-    whole = Stage.of(total, 1e-8, 1e-6)
+    samples = problems[0][0].samples
+    fast = samples.compressed > 0
+    part = Span.nodes if fast else Span.cells
+    colour = Stage.of(part(samples, COLOUR_BLOCKS[fast]), 1e-2, 1e-2)
+    coarse = Stage.of(part(samples, COARSE_BLOCKS[fast]), 1e-6, 1.0)
+    whole = Stage.of(part(samples), 1e-9, 1e-6)
     ranked: list[tuple[float, Problem, Box, Minimum]] = []
     for problem, box, starts in problems:
         linear = jnp.asarray([c.linear for c, _ in problem.chart.vector(problem.channels)])
@@ -113,13 +118,13 @@ def search(problems: list[tuple[Problem, Box, list[NDArray[np.float64]]]]) -> Fo
         if finished and not cost <= WORTH * distinct[0][0]:
             continue
         end = solve(problem, m.x, box, whole)
-        passes += int(end.steps)
+        passes += 0 if fast else int(end.steps)
         finished.append((_finite(float(end.cost)), count, problem, box, end))
     finished.sort(key=lambda f: f[0])
     optima = [Optimum(float(np.sqrt(cost)), count) for cost, count, *_ in finished]
     optima += [Optimum(float(np.sqrt(d[0])), n) for d, n in list(zip(distinct, counts, strict=True))[len(finished) :]]
     _, _, problem, box, best = finished[0]
-    return Found(problem, box, best, sum(len(s) for _, _, s in problems), _merged(optima), passes)
+    return Found(problem, box, best, sum(len(s) for _, _, s in problems), _merged(optima), passes, not fast)
 
 
 def _merged(optima: list[Optimum]) -> tuple[Optimum, ...]:

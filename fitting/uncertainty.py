@@ -28,6 +28,8 @@ class Uncertainty:
     jackknife: Reals
     undetermined: NDArray[np.bool_]
     """Coordinates that the data do not determine."""
+    shift: float
+    """Largest coordinate of the Gauss-Newton step from here, in standard errors."""
 
 
 def uncertainty(bands: Reals, middle: Reals, moving: NDArray[np.bool_]) -> Uncertainty:
@@ -40,7 +42,7 @@ def uncertainty(bands: Reals, middle: Reals, moving: NDArray[np.bool_]) -> Uncer
     undetermined |= moving & ~(np.diag(total)[:n] > 0)
     at = np.flatnonzero(moving & ~undetermined)
     if not len(at):
-        return Uncertainty(statistical, jackknife, undetermined)
+        return Uncertainty(statistical, jackknife, undetermined, 0.0)
     inverse, null = _pseudo_inverse(total[np.ix_(at, at)])
     undetermined[at] = null
     statistical[np.ix_(at, at)] = inverse @ middle[np.ix_(at, at)] @ inverse
@@ -49,7 +51,11 @@ def uncertainty(bands: Reals, middle: Reals, moving: NDArray[np.bool_]) -> Uncer
     deviation = steps - steps.mean(0)
     count = len(steps)
     jackknife[np.ix_(at, at)] = (count - 1) / count * deviation.T @ deviation
-    return Uncertainty(statistical, jackknife, undetermined)
+    errors = np.sqrt(np.diag(statistical)[at])
+    step = np.abs(_delete(total, at))
+    with np.errstate(divide="ignore", invalid="ignore"):
+        shift = float(np.max(np.where(step > 0, step / errors, 0.0)))
+    return Uncertainty(statistical, jackknife, undetermined, shift)
 
 
 def _delete(rest: Reals, at: NDArray[np.int64]) -> Reals:
