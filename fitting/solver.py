@@ -17,6 +17,10 @@ from jaxtyping import Array, Bool, Float
 
 Vector = Float[Array, "n"]
 
+ROUNDING = 1e-14
+"""Residual, relative to what the coordinates do to it, that is rounding: 45 units in the last place. Below it the cost
+goes up and down at random, and a search for less goes on as long as it may."""
+
 
 class Box(eqx.Module):
     """Bounds of a vector, and which of its elements may move at all."""
@@ -114,8 +118,8 @@ class BoxDescent(optx.AbstractDescent):  # type: ignore[misc]
 class BoxLevenbergMarquardt(optx.AbstractGaussNewton):  # type: ignore[misc]
     """Levenberg-Marquardt that stops on what matters: ``rtol`` is the relative decrease of the cost that still counts.
 
-    Successful when an accepted, hardly damped step lowers the cost by less than ``rtol`` relative, or when ``patience``
-    steps in a row were rejected (the cost is flat to rounding).
+    Successful when an accepted, hardly damped step lowers the cost by less than ``rtol`` relative, when ``patience``
+    steps in a row were rejected (the cost is flat to rounding), or when the residual itself is rounding.
     """
 
     rtol: Array | float
@@ -144,7 +148,11 @@ class BoxLevenbergMarquardt(optx.AbstractGaussNewton):  # type: ignore[misc]
         damped = self.descent.damping > 1e-2 * new.search_state.step_size
         stalled = accepted & ~state.first_step & ~damped & (before - after <= self.rtol * before)
         hopeless = new.num_steps_since_acceptance >= self.patience
-        return new_y, eqx.tree_at(lambda s: s.terminate, new, stalled | hopeless | (after == 0)), aux
+        # A column times its coordinate is what 100 % of it does to the residual, and sets the size of rounding
+        # (tests/test_solver.py::test_exact_problems_stop_at_rounding).
+        columns = new.f_info.jac.as_matrix()
+        rounding = jnp.max(jnp.sum(columns**2, 0) * new_y**2, initial=0.0) * ROUNDING**2
+        return new_y, eqx.tree_at(lambda s: s.terminate, new, stalled | hopeless | (after <= rounding)), aux
 
 
 class Minimum(eqx.Module):
