@@ -7,7 +7,7 @@ valleys have a chart of their own (the reason stands at each).
 
 from __future__ import annotations
 
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass, replace
 from functools import lru_cache
 
@@ -67,12 +67,12 @@ class Chart:
         k = len(self.channel)
         return x[: channels * k].reshape(channels, k), x[channels * k :]
 
-    def parameters(self, own: Array, shared: Array) -> Scalars:
+    def parameters(self, own: Sequence[Array] | Array, shared: Sequence[Array] | Array) -> Scalars:
         """Parameters of one channel from its own coordinates ``[K]`` and the shared ones ``[S]``."""
         values = {c.name: own[i] for i, c in enumerate(self.channel)} | {c.name: shared[i] for i, c in enumerate(self.shared)}
         return self.to_parameters(values)
 
-    def model(self, own: Array, shared: Array) -> BRDF:
+    def model(self, own: Sequence[Array] | Array, shared: Sequence[Array] | Array) -> BRDF:
         """The model of one channel, its parameters scalars."""
         return self.cls(**self.parameters(own, shared))
 

@@ -44,27 +44,32 @@ class Problem(eqx.Module):
         return self.samples.measured.shape[1]
 
     @property
+    def own_lobes(self) -> bool:
+        """Whether channels differ in more than what the BRDF is affine in."""
+        return any(not c.linear for c in self.chart.channel)
+
+    @property
     def size(self) -> int:
         """Length n of the vector of coordinates."""
         return self.channels * len(self.chart.channel) + len(self.chart.shared)
 
 
-def _columns(function: Callable[[Vector], Array], x: Vector) -> tuple[list[Array], Array]:
+def _columns(function: Callable[[list[Array]], Array], x: list[Array]) -> tuple[list[Array], Array]:
     """Columns of the Jacobian, one forward derivative each, and the value.
 
-    Each derivative is taken with the other coordinates held, so that what they do not touch is absent from its program;
-    the value is computed once, as the compiler finds the copies equal.
+    Coordinates are separate scalars and each derivative is taken with the others held, so that what a coordinate does not
+    touch is absent from its program, and what channels share is computed once for all of them. The compiler finds the
+    copies of the value equal.
     """
     columns = []
-    value = None
-    for k in range(x.size):
+    for k in range(len(x)):
 
         def along(t: Array, k: int = k) -> Array:
-            return function(jnp.stack([t if i == k else x[i] for i in range(x.size)]))
+            return function([*x[:k], t, *x[k + 1 :]])
 
-        value, tangent = jax.jvp(along, (x[k],), (jnp.ones((), x.dtype),))
+        _, tangent = jax.jvp(along, (x[k],), (jnp.ones_like(x[k]),))
         columns.append(tangent)
-    return columns, function(x) if value is None else value
+    return columns, function(x)
 
 
 def _root_weight(loss: Loss, g: Geometry, weight: Array) -> Array:
@@ -73,46 +78,65 @@ def _root_weight(loss: Loss, g: Geometry, weight: Array) -> Array:
 
 
 class _Tables(eqx.Module):
-    """Functions of one polar angle that a model asks for, at coordinates x, with their derivatives.
+    """Functions of one polar angle that a model asks for, with their derivatives in the coordinates that bend them.
 
     They depend on the coordinates alone, so they are made once a pass. In a block they enter as their first-order
-    expansions about x, which is all that a Jacobian at x needs; coordinates that the BRDF is affine in have no part in
-    them.
+    expansions, which is all that a Jacobian needs.
     """
 
-    x: Vector
+    x: list[Array]
     values: list[Array]
-    slopes: list[Array]
+    slopes: list[list[Array]]
 
-    def near(self, y: Vector, curved: list[int]) -> PolarTables:
-        """The tables at y, to first order in the coordinates that bend the model."""
-        step = [y[i] - self.x[i] for i in curved]
-        tables = zip(self.values, self.slopes, strict=True)
-        return PolarTables([v + sum(d * s[:, i] for d, i in zip(step, curved, strict=True)) for v, s in tables])
+    def near(self, y: list[Array]) -> PolarTables:
+        """The tables at coordinates y, to first order."""
+        steps = [a - b for a, b in zip(y, self.x, strict=True)]
+        return PolarTables([sum((d * s for d, s in zip(ds, steps, strict=True)), v) for v, ds in self._each()])
+
+    def _each(self) -> list[tuple[Array, list[Array]]]:
+        return [(v, [d[i] for d in self.slopes]) for i, v in enumerate(self.values)]
 
 
-def _curved(chart: Chart) -> list[int]:
-    """Positions, in a channel's coordinates followed by the shared ones, of those that the BRDF is not affine in."""
-    return [i for i, c in enumerate((*chart.channel, *chart.shared)) if not c.linear]
+def _bending(chart: Chart, own: list[Array], shared: list[Array]) -> list[Array]:
+    """The coordinates that the BRDF is not affine in: those that tables of polar angles depend on."""
+    pairs = zip((*chart.channel, *chart.shared), (*own, *shared), strict=True)
+    return [v for c, v in pairs if not c.linear]
+
+
+def _tables(problem: Problem, own: list[Array], shared: list[Array]) -> _Tables:
+    """Polar functions of one channel's model."""
+    chart = problem.chart
+    g, _, _ = problem.samples.block(jnp.zeros((), int))
+    bent = _bending(chart, own, shared)
+
+    def make(y: list[Array]) -> list[Array]:
+        given = iter(y)
+        o = [v if c.linear else next(given) for c, v in zip(chart.channel, own, strict=True)]
+        s = [v if c.linear else next(given) for c, v in zip(chart.shared, shared, strict=True)]
+        tables = PolarTables()
+        chart.model(o, s).evaluate(replace(g, tables=tables))
+        return tables.made
+
+    slopes, values = _columns_of_lists(make, bent)
+    return _Tables(bent, values, slopes)
+
+
+def _columns_of_lists(make: Callable[[list[Array]], list[Array]], x: list[Array]) -> tuple[list[list[Array]], list[Array]]:
+    def along(k: int) -> list[Array]:
+        tangent: list[Array] = jax.jvp(lambda t: make([*x[:k], t, *x[k + 1 :]]), (x[k],), (jnp.ones_like(x[k]),))[1]
+        return tangent
+
+    return [along(k) for k in range(len(x))], make(x)
 
 
 def polar_tables(problem: Problem, x: Vector) -> _Tables:
-    """Polar functions of every channel's model, all leaves with a leading axis ``[C]``."""
-    chart = problem.chart
-    own, shared = chart.split(x, problem.channels)
-    k = len(chart.channel)
-    g, _, _ = problem.samples.block(jnp.zeros((), int))
-
-    def make(y: Vector) -> list[Array]:
-        tables = PolarTables()
-        chart.model(y[:k], y[k:]).evaluate(replace(g, tables=tables))
-        return tables.made
-
-    def one(own_c: Vector) -> _Tables:
-        y = jnp.concatenate([own_c, shared])
-        return _Tables(y, make(y), jax.jacfwd(make)(y))
-
-    return jax.vmap(one)(own)
+    """Polar functions at coordinates x: of every channel, with a leading axis ``[C]``, if channels have lobes of their own,
+    of all of them at once if they share theirs.
+    """
+    own, shared = problem.chart.split(x, problem.channels)
+    if problem.own_lobes:
+        return jax.vmap(lambda o: _tables(problem, list(o), list(shared)))(own)
+    return _tables(problem, list(own[0]), list(shared))
 
 
 def channel_rows(
@@ -123,18 +147,17 @@ def channel_rows(
     own, shared = chart.split(x, problem.channels)
     root = _root_weight(loss, g, weight)
     k = len(chart.channel)
-    curved = _curved(chart)
 
     def one(own_c: Vector, tables_c: _Tables, measured_c: Array) -> Array:
-        def residual(y: Vector) -> Array:
-            at = replace(g, tables=tables_c.near(y, curved))
+        def residual(y: list[Array]) -> Array:
+            at = replace(g, tables=tables_c.near(_bending(chart, y[:k], y[k:])))
             f = jnp.broadcast_to(chart.model(y[:k], y[k:]).evaluate(at), measured_c.shape)
             return root * loss(f[..., None], measured_c[..., None], g)[..., 0]
 
-        columns, value = _columns(residual, jnp.concatenate([own_c, shared]))
+        columns, value = _columns(residual, [*own_c, *shared])
         return jnp.stack([*(jnp.broadcast_to(c, value.shape) for c in columns), value])
 
-    return jax.vmap(one)(own, tables, measured)
+    return jax.vmap(one, in_axes=(0, 0 if problem.own_lobes else None, 0))(own, tables, measured)
 
 
 def joint_rows(
@@ -146,23 +169,20 @@ def joint_rows(
     flat = g.flat()
     root = _root_weight(loss, flat, weight.reshape(-1))
     m = jnp.moveaxis(measured, 0, -1).reshape(-1, problem.channels)
-    k = len(chart.channel)
-    curved = _curved(chart)
 
-    def residual(y: Vector) -> Array:
-        own, shared = chart.split(y, problem.channels)
+    def residual(y: list[Array]) -> Array:
+        own, shared = chart.split(jnp.stack(y), problem.channels)
 
         def one(own_c: Vector, tables_c: _Tables) -> Array:
-            z = jnp.concatenate([own_c, shared])
-            f = chart.model(z[:k], z[k:]).evaluate(replace(g, tables=tables_c.near(z, curved)))
-            return jnp.broadcast_to(f, cells)
+            at = replace(g, tables=tables_c.near(_bending(chart, list(own_c), list(shared))))
+            return jnp.broadcast_to(chart.model(own_c, shared).evaluate(at), cells)
 
-        f = jax.vmap(one, out_axes=-1)(own, tables)
+        f = jax.vmap(one, in_axes=(0, 0 if problem.own_lobes else None), out_axes=-1)(own, tables)
         r = loss(f.reshape(-1, problem.channels), m, flat)
         r = jnp.asarray(r).reshape(root.size, -1)
         return jnp.moveaxis(root[:, None] * r, -1, 0).reshape(-1, *cells)
 
-    columns, value = _columns(residual, x)
+    columns, value = _columns(residual, list(x))
     return jnp.stack([*columns, value])
 
 
