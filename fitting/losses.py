@@ -85,9 +85,13 @@ def _cbrt_jvp(primals: tuple[Array], tangents: tuple[Array]) -> tuple[Array, Arr
 
 
 def _log(f: Values, m: Values, g: Geometry) -> Values:
-    """ln(1 + f cos_i) - ln(1 + m cos_i), as one logarithm that does not cancel where f is close to m."""
+    """ln(1 + f cos_i) - ln(1 + m cos_i), as one logarithm that does not cancel where f is close to m.
+
+    Its argument is positive whichever is larger: log1p near -1 has no digits left, and f far below a huge m is there.
+    """
     cos_i = g.cos_i[..., None]
-    return jnp.log1p((f - m) * cos_i / (1 + m * cos_i))
+    sign = jnp.where(f >= m, 1.0, -1.0)
+    return sign * jnp.log1p(sign * (f - m) * cos_i / (1 + jnp.where(f >= m, m, f) * cos_i))
 
 
 def _ngan(f: Values, m: Values, g: Geometry) -> Values:
