@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import json
 import math
+import os
 from collections.abc import Sequence
 from pathlib import Path
 from tempfile import TemporaryFile
@@ -104,13 +105,13 @@ def fit_command(
     files = tuple(dict.fromkeys(files))
     for path in files:  # nothing is fitted or written if one of them cannot be used
         load(path, angles=angles)
+    _keep_programs()
     names = _checked_names(models, loss)
     out = _writable(out_dir)
-    _cache_programs()
 
     from .environment import environment
     from .fitting import fit_many
-    from .reports import gather, save_evidence, write_fits, write_report
+    from .reports import gather, rebuild_report, save_evidence, write_fits
 
     fits: list[Fit] = []
     evidence: list[Evidence] = []
@@ -133,7 +134,7 @@ def fit_command(
             interrupted = True
         if report and fits:
             save_evidence(out, evidence)
-            write_report(out, fits, evidence, where)
+            rebuild_report(out)
     if interrupted:
         raise KeyboardInterrupt
     if as_json:
@@ -164,6 +165,7 @@ def synth_command(
 
     Without a NAME, a few of each sort.
     """
+    _keep_programs()
     from .data import synthetic
 
     if list_names:
@@ -225,18 +227,18 @@ def _writable(out_dir: str) -> Path:
         with TemporaryFile(dir=out):
             return out
     except OSError as fault:
-        raise InputError(f"{out_dir}: cannot be written to ({fault.strerror or fault}); choose another --out") from None
+        raise InputError(
+            f"{out_dir}: nothing can be written there ({fault.strerror or fault}); choose another --out"
+        ) from None
 
 
-def _cache_programs() -> None:
-    """Keep compiled programs from run to run in the user's cache directory (this process only: a library must not)."""
-    import jax
-    from platformdirs import user_cache_dir
+def _keep_programs() -> None:
+    """Have JAX keep compiled programs from run to run in the user's cache directory (it reads this when imported)."""
+    from platformdirs import user_cache_path
 
-    if jax.config.jax_compilation_cache_dir is None:
-        jax.config.update("jax_compilation_cache_dir", str(Path(user_cache_dir("brdfit")) / "programs"))
-        jax.config.update("jax_persistent_cache_min_compile_time_secs", 0.0)
-        jax.config.update("jax_persistent_cache_min_entry_size_bytes", -1)
+    os.environ.setdefault("JAX_COMPILATION_CACHE_DIR", str(user_cache_path("brdfit") / "programs"))
+    os.environ.setdefault("JAX_PERSISTENT_CACHE_MIN_COMPILE_TIME_SECS", "0")
+    os.environ.setdefault("JAX_PERSISTENT_CACHE_MIN_ENTRY_SIZE_BYTES", "-1")
 
 
 def _line(f: Fit) -> str:

@@ -1,0 +1,54 @@
+"""Compiled programs shared by all workers and child processes of a run, and tables that several tests use."""
+
+import importlib.util
+import os
+import shutil
+import tempfile
+from pathlib import Path
+
+import pytest
+
+SHARED = Path(__file__).resolve().parents[2] / "shared"
+
+
+def pytest_configure(config):
+    if not hasattr(config, "workerinput"):  # the first process; its workers inherit the environment
+        config.programs = tempfile.mkdtemp(prefix="brdfit-programs-")
+        os.environ["JAX_COMPILATION_CACHE_DIR"] = config.programs
+        os.environ["JAX_PERSISTENT_CACHE_MIN_COMPILE_TIME_SECS"] = "0"
+        os.environ["JAX_PERSISTENT_CACHE_MIN_ENTRY_SIZE_BYTES"] = "-1"
+
+
+def pytest_unconfigure(config):
+    if hasattr(config, "programs"):
+        shutil.rmtree(config.programs, ignore_errors=True)
+
+
+@pytest.fixture(scope="session")
+def small_table():
+    """``ward-03`` on 24 x 12 x 12 cells, and its truth."""
+    from brdfit.data import synthetic
+
+    return synthetic.generate("ward-03", grid=(24, 12, 12))
+
+
+@pytest.fixture(scope="session")
+def small_file(small_table, tmp_path_factory):
+    """The same as a MERL file."""
+    import brdfit
+
+    path = tmp_path_factory.mktemp("tables") / "stuff.binary"
+    brdfit.save(small_table[0], path)
+    return path
+
+
+@pytest.fixture(scope="session")
+def merl():
+    """Planes ``[3, 90, 90, 180]``, as stored, of a real material by name."""
+    script = SHARED / "tools" / "make_merl.py"
+    if not script.exists():
+        pytest.skip("the networks of real materials are not part of the repository")
+    spec = importlib.util.spec_from_file_location("make_merl", script)
+    module = importlib.util.module_from_spec(spec)
+    spec.loader.exec_module(module)
+    return module.table
