@@ -22,6 +22,8 @@ Reals = NDArray[np.float64]
 RANDOM_PARAMETERS = 6
 """Random parameter sets a model on top of those listed; raise it to search for failures."""
 RANDOM_DIRECTIONS = 12
+DERIVATIVE_STRIDE = 3
+"""Of the pairs of case and direction of a closed form, each third has its derivatives checked; 1 checks all."""
 
 NEAR = tuple(s * 10.0**e for e in (-15, -12, -9, -6, -3) for s in (1, -1))
 """Offsets from a removable singularity."""
@@ -44,11 +46,9 @@ POLAR = np.radians([0.0, 1e-6, 20.0, 45.0, 75.0, 89.0, 89.995])
 def directions() -> tuple[Reals, Reals]:
     """Pairs ``(wi, wo)``, each ``[n, 3]``: ordinary, mirror, retro, and the corners of the domain."""
     rng = np.random.default_rng(7)
-    turn = lambda: rng.uniform(0, 2 * np.pi)  # noqa: E731
     # polar angles from the fixed set, so that masking is not a new integral for each pair
-    ordinary = [
-        (unit(rng.choice(POLAR[2:5]), turn()), unit(rng.choice(POLAR[2:]), turn())) for _ in range(RANDOM_DIRECTIONS)
-    ]
+    angles = rng.choice(POLAR[2:], (RANDOM_DIRECTIONS, 2))
+    ordinary = [(unit(a, rng.uniform(0, 7)), unit(b, rng.uniform(0, 7))) for a, b in angles]
     mirror = [(unit(t, 0.3), unit(t, 0.3 + np.pi)) for t in POLAR]
     retro = [(unit(t, 0.3), unit(t, 0.3)) for t in POLAR]
     off_across = [
@@ -99,6 +99,13 @@ class Row:
 
     def directions(self) -> tuple[Reals, Reals]:
         return (WI[FEW], WO[FEW]) if self.few else (WI, WO)
+
+    def gradient_pairs(self) -> tuple[Any, Any]:
+        """Indices of the pairs of case and direction whose derivatives have an oracle."""
+        case = np.arange(len(self.cases))
+        if self.few:
+            return case, FEW[[1, 14, -4]][case % 3]
+        return np.nonzero((case[:, None] + np.arange(len(WI))) % DERIVATIVE_STRIDE == 0)
 
     def stacked(self, dtype: Any = np.float64) -> BRDF:
         """All cases as one instance with a leading axis of cases, and one channel."""
@@ -248,6 +255,15 @@ def expected_values(name: str) -> Reals:
     row = next(r for r in TABLE if r.name == name)
     wi, wo = row.directions()
     return np.array([[float(oracle.value(name, dict(c), a, b)) for a, b in zip(wi, wo, strict=True)] for c in row.cases])
+
+
+@cache
+def expected_slopes(name: str) -> dict[str, Reals]:
+    """Oracle derivatives of a row at its ``gradient_pairs``, by parameter and component, as float64."""
+    row = next(r for r in TABLE if r.name == name)
+    pairs = zip(*row.gradient_pairs(), strict=True)
+    found = [oracle.gradient(name, dict(row.cases[c]), WI[d], WO[d]) for c, d in pairs]
+    return {key: np.array([float(g[key]) for g in found]) for key in found[0]}
 
 
 # Distributions and shared parts ---------------------------------------------------------------------------------------

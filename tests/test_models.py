@@ -9,10 +9,11 @@ import jax.numpy as jnp
 import numpy as np
 import pytest
 from brdfit import models
+from brdfit.geometry import from_directions
 from brdfit.models import BRDF, MODELS, parameters_of
 
 from . import cases, oracle
-from .cases import TABLE, Row
+from .cases import KINK, TABLE, WI, WO, Row
 
 rows = pytest.mark.parametrize("row", TABLE, ids=lambda r: r.name)
 
@@ -70,3 +71,137 @@ def test_value(row: Row):
     worst = np.unravel_index(np.nanargmax(error), error.shape)
     assert np.isfinite(got).all()
     assert error.max() <= row.tolerance, (error.max(), row.cases[worst[0]], wi[worst[1]], wo[worst[1]], want[worst])
+
+
+@rows
+def test_finite_derivatives(row: Row):
+    """Of the first and second order, by every parameter and direction, at every corner: no NaN from an unused branch."""
+    for name, slope in slopes(row, WI, WO).items():
+        assert np.isfinite(slope).all(), name
+
+    def one(m: BRDF, wi: jax.Array, wo: jax.Array) -> jax.Array:
+        return m(wi, wo)[0]
+
+    def along(*point: jax.Array) -> jax.Array:
+        """Second derivatives summed over one argument: not finite if any of them is not."""
+        return jax.jvp(jax.grad(one, (0, 1, 2)), point, jax.tree.map(jnp.ones_like, point))[1]
+
+    few = np.r_[0:2, 12:26:4, 26, len(WI) - 5 : len(WI)]
+    with jax.enable_x64(True):
+        second = jax.jit(jax.vmap(jax.vmap(along, (None, 0, 0)), (0, None, None)))
+        blocks = jax.tree.leaves(second(jax.tree.map(jnp.asarray, row.stacked()), WI[few], WO[few]))
+    assert all(np.isfinite(b).all() for b in blocks)
+
+
+@rows
+def test_derivative(row: Row):
+    """Against 40-digit difference quotients, to 1e-8 of the larger of the derivative and value/parameter."""
+    case, direction = row.gradient_pairs()
+    got, want = slopes(row, WI, WO), cases.expected_slopes(row.name)
+    values = np.abs(evaluate(row, WI, WO)[case, direction])
+    for name, slope in got.items():
+        physical = name in row.cases[0]
+        size = np.array([abs(c.get(name, 1.0)) for c in row.cases])[case]  # components of directions count as of size 1
+        scale = np.where(size > 0, values / np.where(size > 0, size, 1), 0)
+        # 1e-150: squares of what underflows next to the retro direction, where the oracle's step is not small
+        error = np.abs(slope[case, direction] - want[name]) / (np.maximum(np.abs(want[name]), scale) + 1e-150)
+        if row.kinked and not physical:
+            error = np.where(KINK[direction], 0, error)
+        w = np.argmax(error)
+        where = row.cases[case[w]], WI[direction[w]], WO[direction[w]]
+        assert error[w] <= 1e-8, (name, error[w], slope[case, direction][w], want[name][w], where)
+
+
+@rows
+def test_reciprocity(row: Row):
+    """f(l, v) = f(v, l) to the rounding of exponents of up to 700."""
+    there, back = evaluate(row, WI, WO), evaluate(row, WO, WI)
+    np.testing.assert_allclose(there, back, rtol=1e-12, atol=1e-290)
+
+
+@rows
+def test_below_the_horizon(row: Row):
+    """Zero with zero gradient where either direction is at or below the horizon."""
+    up, level = np.array([0.6, 0.0, 0.8]), np.array([1.0, 0.0, 0.0])
+    wi = np.stack([up, -up, -up, level, up, up * [1, 1, -1]])
+    wo = np.stack([-up, up, -up, up, level, up * [1, 1, -1]])
+    assert (evaluate(row, wi, wo) == 0).all()
+    for name, slope in slopes(row, wi, wo).items():
+        assert (slope == 0).all(), name
+
+
+@rows
+def test_single_precision(row: Row):
+    """float32 on directions and parameters that float32 holds exactly, against float64; and finite in any case.
+
+    1e-5 is promised of the sum of the terms (an SGD of negative Fresnel cancels the body term). Where a lobe has fallen to
+    e^-E of its peak, about four roundings of 6e-8 each count E times: 3e-5 below 1e-12 of the peak. exp underflows at
+    e^-87, and the factors on it reach 1e11: what is below 1e-25 need only be small.
+    """
+    stacked = row.stacked(np.float32)
+    wi, wo = WI.astype(np.float32), WO.astype(np.float32)
+    got = evaluate(row, wi, wo, np.float32).astype(float)
+    with jax.enable_x64(True):
+        exact = jax.tree.map(lambda x: jnp.asarray(x, np.float64), stacked)
+        want = np.asarray(jax.jit(jax.vmap(lambda m: m(wi.astype(float), wo.astype(float))[..., 0]))(exact))
+    assert np.isfinite(got).all()
+    body = np.array([c["diffuse"] / np.pi for c in row.cases])[:, None]
+    error = np.abs(got - want) / (np.maximum(np.abs(want), body) + 1e-23)
+    tolerance = np.where(want > 1e-12 * want.max(1, keepdims=True), 1e-5, 3e-5)
+    worst = np.unravel_index(np.argmax(error / tolerance), error.shape)
+    assert (error <= tolerance).all(), (error[worst], row.cases[worst[0]], wi[worst[1]], wo[worst[1]], want[worst])
+    # The slope of a density D by sin^2 is about pi D^2 at its peak, which float32 cannot hold from D = 1e19 on.
+    holds = want.max(1) < 1e14
+    for name, slope in slopes(row, WI, WO, np.float32).items():
+        assert np.isfinite(slope[holds]).all(), name
+
+
+@rows
+def test_eager_is_jit_is_vmap(row: Row):
+    """One program compiled, run operation by operation, or mapped over directions: the same but for fused roundings."""
+    wi, wo = WI[::16], WO[::16]
+    for case in row.cases[:1]:
+        with jax.enable_x64(True):
+            m = models.build(row.model, dict(case))
+            eager = np.asarray(m(wi, wo))
+            mapped = np.asarray(jax.vmap(m)(wi, wo))
+            loop = np.stack([np.asarray(m(a, b)) for a, b in zip(wi, wo, strict=True)])
+            compiled = np.asarray(jax.jit(lambda m, a, b: m(a, b))(m, wi, wo))
+        assert eager.shape == (len(wi), 3)
+        for other in (mapped, loop, compiled):
+            np.testing.assert_allclose(other, eager, rtol=1e-12, atol=1e-290)
+
+
+@pytest.mark.parametrize("name", [n for n, v in MODELS.items() if len(v) > 1])
+def test_anisotropic_with_equal_widths(name: str):
+    """Equals the isotropic form, to the rounding of exponents of up to 700."""
+    round_row, long_row = (next(r for r in TABLE if r.model is v) for v in MODELS[name])
+    rounds = {p.name for p in parameters_of(round_row.model)}
+    (width,) = rounds - {p.name for p in parameters_of(long_row.model)}
+    split = [
+        {**{k: v for k, v in c.items() if k != width}, f"{width}_x": c[width], f"{width}_y": c[width]}
+        for c in round_row.cases
+    ]
+    same = Row(long_row.model, tuple(split), 0)
+    np.testing.assert_allclose(evaluate(same, WI, WO), evaluate(round_row, WI, WO), rtol=1e-12, atol=1e-290)
+
+
+def test_absent_effects_cost_nothing():
+    """The program of a model holds the operations of its formula and no others."""
+    with jax.enable_x64(True):
+        g = from_directions(WI, WO)
+
+        def program(m: BRDF) -> str:
+            return str(jax.make_jaxpr(lambda m: m.evaluate(g))(m))
+
+        scalar = {r.name: jax.tree.map(lambda x: jnp.asarray(x).reshape(-1)[0], r.stacked()) for r in TABLE}
+        by_hand = str(jax.make_jaxpr(lambda m: m.diffuse / jnp.pi)(scalar["Lambert"]))
+        assert program(scalar["Lambert"]) == by_hand
+        w = scalar["Ward"]
+
+        def ward(m: BRDF) -> jax.Array:
+            tan2 = g.sin2_h / (g.cos_h * g.cos_h)
+            d = jnp.exp(-tan2 / m.alpha**2) / (jnp.pi * m.alpha**2)
+            return m.diffuse / jnp.pi + m.specular * (d / (4 * jnp.sqrt(g.cos_i * g.cos_o)))
+
+        assert program(w) == str(jax.make_jaxpr(ward)(w))

@@ -1,0 +1,116 @@
+"""Normal distributions: normalisation, the ends of their range, and the agreement of their forms."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from typing import Any
+
+import jax
+import jax.numpy as jnp
+import numpy as np
+import pytest
+from brdfit.models import ndf
+
+from . import cases
+
+CASES = [(name, parameters) for name, (_, sets) in cases.NDFS.items() for parameters in sets]
+
+
+def density(name: str, parameters: tuple[float, ...]) -> Callable[[Any, Any], Any]:
+    """D(sin^2, cos^2) of any of the forms that the package has."""
+    values = [jnp.asarray(p) for p in parameters]
+    if name == "power_cosine":
+        return lambda sin2, cos2: ndf.power_cosine(sin2, cos2, *values)
+    if name == "gaussian":
+        return lambda sin2, cos2: ndf.gaussian(sin2 / cos2, *values)
+    return cases.NDFS[name][0](*values)
+
+
+def rule() -> tuple[np.ndarray, np.ndarray, np.ndarray]:
+    """sin^2, cos^2 and weights of the integral over directions, in x = ln tan(theta) by the trapezoidal rule.
+
+    All densities are analytic in x within pi/4 of the real axis (Gaussian ones; others pi/2): its error is
+    exp(-2 pi (pi/4)/step), 1e-42 for a step of 0.05. e^-40 of the mass is left out on either side.
+    """
+    x = np.arange(-45, 45, 0.05)
+    t2 = np.exp(2 * x)
+    sin2, cos2 = t2 / (1 + t2), 1 / (1 + t2)
+    return sin2, cos2, 0.05 * 2 * np.pi * sin2 * np.sqrt(cos2)  # sin dtheta = sin^2 cos dx
+
+
+@pytest.mark.parametrize(("name", "parameters"), CASES)
+def test_normalisation(name: str, parameters: tuple[float, ...]):
+    """The integral of D cos is 1. That of D alone for (e + 1)/(2 pi) cos^e, a density of half vectors, and that of
+    D/cos^3 for Ward's lobe, a density of slopes.
+    """
+    sin2, cos2, weight = rule()
+    with jax.enable_x64(True):
+        d = np.asarray(density(name, parameters)(jnp.asarray(sin2), jnp.asarray(cos2)))
+    power = {"power_cosine": 0, "gaussian": -3}.get(name, 1)
+    # 1e-13: 1800 terms of one sign, each rounded in an exponent of up to 30 where it counts; ABC depends on 1 - cos with
+    # singularities nearer to the real axis for small b, worth 1e-12
+    assert np.sum(weight * np.sqrt(cos2) ** power * d) == pytest.approx(1, rel=2e-12)
+
+
+@pytest.mark.parametrize(("name", "parameters"), CASES)
+def test_finite_at_both_ends(name: str, parameters: tuple[float, ...]):
+    """D and its derivatives at the pole, and next to and on the horizon, in both precisions."""
+    for dtype, gap in ((np.float64, 1e-18), (np.float32, 1e-12)):
+        with jax.enable_x64(dtype is np.float64):
+            values = jnp.asarray(parameters, dtype)
+            on_horizon = [(1.0, 0.0)] if name in ("GTR", "SGD") else []  # the others are not defined there
+            both = jax.jit(jax.value_and_grad(lambda v, e: density(name, tuple(v))(e[0], e[1]), (0, 1)))
+            for sin2, cos2 in [(0.0, 1.0), (gap, 1.0), (1.0, gap), *on_horizon]:
+                value, slopes = both(values, jnp.asarray([sin2, cos2], dtype))
+                assert np.isfinite(value)
+                assert all(np.isfinite(a).all() for a in slopes)
+
+
+@pytest.mark.parametrize(("alpha", "p"), [(1e-7, -10.0), (1e-7, 60.0), (0.05, 0.6), (30.0, -10.0), (30.0, 60.0)])
+def test_sgd_at_the_horizon(alpha: float, p: float):
+    """0 with zero derivatives of the first and second order: x overflows where exp(-x) has long been 0."""
+    with jax.enable_x64(True):
+        f = lambda v: ndf.SGD(v[0], v[1])(v[2], v[3])  # noqa: E731
+        for cos2 in (0.0, 1e-300, 1e-150, 1e-40, 1e-12):
+            v = jnp.array([alpha, p, 1.0, cos2])
+            assert f(v) == 0
+            assert (jax.grad(f)(v) == 0).all()
+            assert (jax.hessian(f)(v) == 0).all()
+
+
+def test_power_cosine_at_both_ends():
+    """Gradient and Hessian are finite where sin^2 is 0 and where it rounds to 1, and the power is right beside them."""
+    with jax.enable_x64(True):
+        f = lambda v: ndf.power_cosine(v[0], v[1], v[2])  # noqa: E731
+        for sin2, cos2 in ((0.0, 1.0), (1.0, 1e-20), (0.5, 0.5), (1e-30, 1.0)):
+            v = jnp.array([sin2, cos2, 3.0])
+            np.testing.assert_allclose(f(v), 4 / (2 * np.pi) * cos2**1.5, rtol=1e-14)  # cos^3 of the cos^2 given
+            assert np.isfinite(jax.grad(f)(v)).all()
+            assert np.isfinite(jax.hessian(f)(v)).all()
+
+
+@pytest.mark.parametrize("name", cases.ANISOTROPIC_NDFS)
+def test_equal_widths(name: str):
+    """The anisotropic form equals the isotropic one, to the rounding of exponents of up to 700."""
+    x2, y2 = np.random.default_rng(5).random((2, 50)) / 2
+    sin2, cos2 = x2 + y2, 1 - x2 - y2
+    with jax.enable_x64(True):
+        for (width,) in cases.NDFS[cases.ANISOTROPIC_NDFS[name]][1]:
+            if name == "power_cosine_anisotropic":
+                long, round_ = ndf.power_cosine_anisotropic(x2, y2, cos2, width, width), ndf.power_cosine(sin2, cos2, width)
+            else:
+                long, round_ = ndf.anisotropic_gaussian(x2, y2, cos2, width, width), ndf.gaussian(sin2 / cos2, width)
+            np.testing.assert_allclose(long, round_, rtol=1e-12, atol=1e-290)
+
+
+def test_limits_of_gtr():
+    """alpha -> 0: a power of the sine. gamma -> infinity at gamma (1/alpha^2 - 1) = K: exp(-K sin^2)."""
+    sin2 = np.array([0.01, 0.2, 0.7])
+    with jax.enable_x64(True):
+        power = ndf.GTR(jnp.asarray(1e-9), jnp.asarray(1.3))(sin2, 1 - sin2)
+        # relative to the limit the base has alpha^2 cot^2 = 1e-16
+        np.testing.assert_allclose(power / power[0], (sin2 / sin2[0]) ** -1.3, rtol=1e-13)
+        k, gamma = 5.0, 1e7
+        lobe = ndf.GTR(jnp.asarray((1 + k / gamma) ** -0.5), jnp.asarray(gamma))(sin2, 1 - sin2)
+    # k^2/gamma sin^4/2, the next term of gamma ln(1 + k sin^2/gamma), and alpha rounded: eps gamma = 2e-9
+    np.testing.assert_allclose(lobe / lobe[0], np.exp(-k * (sin2 - sin2[0])), rtol=2e-6)
