@@ -1,0 +1,35 @@
+"""A loss of one's own: any JAX function of the predicted values, the measured values and the geometry.
+
+    python examples/custom_loss.py [DIR]
+
+Fits Ward's model to a synthetic material by a named loss and by this one, and writes DIR/report.html.
+"""
+
+import sys
+from pathlib import Path
+
+import brdfit
+from brdfit.data import synthetic
+from brdfit.environment import environment
+from brdfit.reports import gather, write_fits, write_report
+
+
+def reflected_light(predicted, measured, geometry):
+    """Difference of the light that reaches a viewer, relative to what would be white."""
+    return (predicted - measured) * (geometry.cos_i * geometry.cos_o)[..., None]
+
+
+def main(out="out/custom-loss"):
+    """Fit and report."""
+    Path(out).mkdir(parents=True, exist_ok=True)
+    table, _ = synthetic.generate("misfit-two-lobes", grid=(30, 15, 12))
+    fits = [brdfit.fit(table, "ward", loss=loss) for loss in ("log", reflected_light)]
+    for fit in fits:
+        print(f"{fit.loss:16s} alpha {fit.parameters['alpha']:.4f}, {fit.reason}")
+    where = environment()
+    write_fits(out, fits, where)
+    print(f"report: {write_report(out, fits, [gather(table, fits)], where)}")
+
+
+if __name__ == "__main__":
+    main(*sys.argv[1:])
