@@ -118,8 +118,9 @@ class BoxDescent(optx.AbstractDescent):  # type: ignore[misc]
 class BoxLevenbergMarquardt(optx.AbstractGaussNewton):  # type: ignore[misc]
     """Levenberg-Marquardt that stops on what matters: ``rtol`` is the relative decrease of the cost that still counts.
 
-    Successful when an accepted, hardly damped step lowers the cost by less than ``rtol`` relative, when ``patience``
-    steps in a row were rejected (the cost is flat to rounding), or when the residual itself is rounding.
+    Successful when an accepted, hardly damped step lowers the cost by less than ``rtol`` relative or by no more than
+    rounding, when ``patience`` steps in a row were rejected (the cost is flat to rounding), or when the residual itself is
+    rounding.
     """
 
     rtol: Array | float
@@ -146,13 +147,13 @@ class BoxLevenbergMarquardt(optx.AbstractGaussNewton):  # type: ignore[misc]
         before, after = jnp.sum(state.f_info.residual**2), jnp.sum(new.f_info.residual**2)
         accepted = new.num_steps_since_acceptance == 0
         damped = self.descent.damping > 1e-2 * new.search_state.step_size
-        stalled = accepted & ~state.first_step & ~damped & (before - after <= self.rtol * before)
-        hopeless = new.num_steps_since_acceptance >= self.patience
         # A column times its coordinate is what 100 % of it does to the residual, and sets the size of rounding
         # (tests/test_solver.py::test_exact_problems_stop_at_rounding).
-        columns = new.f_info.jac.as_matrix()
-        rounding = jnp.max(jnp.sum(columns**2, 0) * new_y**2, initial=0.0) * ROUNDING**2
-        return new_y, eqx.tree_at(lambda s: s.terminate, new, stalled | hopeless | (after <= rounding)), aux
+        rounding = ROUNDING * jnp.sqrt(jnp.max(jnp.sum(new.f_info.jac.as_matrix() ** 2, 0) * new_y**2, initial=0.0))
+        little = self.rtol * before + 2 * rounding * jnp.sqrt(before)
+        stalled = accepted & ~state.first_step & ~damped & (before - after <= little)
+        hopeless = new.num_steps_since_acceptance >= self.patience
+        return new_y, eqx.tree_at(lambda s: s.terminate, new, stalled | hopeless | (after <= rounding**2)), aux
 
 
 class Minimum(eqx.Module):
