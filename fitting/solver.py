@@ -152,8 +152,11 @@ class BoxLevenbergMarquardt(optx.AbstractGaussNewton):  # type: ignore[misc]
         rounding = ROUNDING * jnp.sqrt(jnp.max(jnp.sum(new.f_info.jac.as_matrix() ** 2, 0) * new_y**2, initial=0.0))
         little = self.rtol * before + 2 * rounding * jnp.sqrt(before)
         stalled = accepted & ~state.first_step & ~damped & (before - after <= little)
+        # A step damped down to nothing counts as accepted, and would be for ever (tests/test_solver.py::test_stops_at_once).
+        still = accepted & ~state.first_step & jnp.all(new_y == y)
         hopeless = new.num_steps_since_acceptance >= self.patience
-        return new_y, eqx.tree_at(lambda s: s.terminate, new, stalled | hopeless | (after <= rounding**2)), aux
+        done = stalled | still | hopeless | (after <= rounding**2)
+        return new_y, eqx.tree_at(lambda s: s.terminate, new, done), aux
 
 
 class Minimum(eqx.Module):
@@ -170,7 +173,9 @@ class Minimum(eqx.Module):
     """Whether it stopped by itself, not by the limit of steps."""
 
 
-def minimise(residual: Callable[[Vector], Array], x: Vector, box: Box, rtol: Array, damping: Array, max_steps: int) -> Minimum:
+def minimise(
+    residual: Callable[[Vector], Array], x: Vector, box: Box, rtol: Array, damping: Array, max_steps: int
+) -> Minimum:
     """Minimise |residual(x)|^2 over a box, from an x inside it."""
     solver = BoxLevenbergMarquardt(box, rtol, damping)
     solution = optx.least_squares(lambda y, _: residual(y), solver, x, max_steps=max_steps, throw=False)
