@@ -25,15 +25,14 @@ def directions(theta_h: ArrayLike, theta_d: ArrayLike, phi_d: ArrayLike, phi_h: 
 
 
 def polar_cosines(theta_h: ArrayLike, theta_d: ArrayLike, phi_d: ArrayLike) -> tuple[Reals, Reals]:
-    """cos(theta_i) and cos(theta_o) of half/difference angles in radians that broadcast.
+    """cos(theta_i) and cos(theta_o) of half/difference angles in radians; negative below the horizon.
 
-    cos_i = cos(theta_h) cos(theta_d) - sin(theta_h) sin(theta_d) cos(phi_d), written as a sum of cos(theta_h + theta_d),
-    taken as the sine of the complement, and a term >= 0, so that nothing cancels up to the horizon.
+    cos(theta_h) cos(theta_d) -+ sin(theta_h) sin(theta_d) cos(phi_d): accurate to the rounding of the angles themselves.
     """
     th, td, pd = (np.asarray(a, float) for a in (theta_h, theta_d, phi_d))
-    base = np.sin((np.pi / 2 - th) - td)
-    across = 2 * np.sin(th) * np.sin(td)
-    return base + across * np.sin(pd / 2) ** 2, base + across * np.cos(pd / 2) ** 2
+    along = np.cos(th) * np.cos(td)
+    across = np.sin(th) * np.sin(td) * np.cos(pd)
+    return along - across, along + across
 
 
 def half_difference(wi: ArrayLike, wo: ArrayLike) -> tuple[Reals, Reals, Reals, Reals]:

@@ -49,15 +49,18 @@ class Table:
         return self.layout.isotropic
 
     def within(self, max_angle: float) -> NDArray[np.bool_]:
-        """Cells that are measured and have both polar angles at most ``max_angle`` radians."""
-        # The slack keeps cells *at* the limit (80 degrees is a row of the grid) whatever the last bit of a cosine.
-        limit = np.cos(max_angle) - 1e-12
+        """Cells that are measured and have both polar angles within ``max_angle`` radians.
+
+        Cells at the limit itself are left out, to rounding: 80 degrees is a row of the MERL grid, and with the edge
+        convention its cells lie beyond.
+        """
+        limit = np.cos(max_angle)
         if isinstance(self.layout, HalfDifferenceGrid):
             ci, co = self.layout.polar_cosines()
         else:
             wi, wo = self.layout.directions()
             ci, co = wi[..., 2], wo[..., 2]
-        return self.mask & (ci >= limit) & (co >= limit) & (ci > 0) & (co > 0)
+        return self.mask & (ci > limit) & (co > limit) & (ci > 0) & (co > 0)
 
 
 def table(planes: NDArray[np.float64], layout: Layout, material: str, **provenance: object) -> Table:

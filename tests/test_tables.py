@@ -138,13 +138,13 @@ def test_values_that_do_not_fit(shape):
         table(np.ones(shape), half_difference(), "steel")
 
 
-def test_within_keeps_the_limit_itself():
+def test_within_leaves_out_the_limit_itself():
     grid = merl_grid()
     found = table(np.ones((1, *grid.shape)), grid, "a").within(np.radians(80))
     # at theta_h = 0 both polar angles are theta_d = j degrees
-    np.testing.assert_array_equal(found[0, :, 0], np.arange(90) <= 80)
+    np.testing.assert_array_equal(found[0, :, 0], np.arange(90) < 80)
     # at theta_d = 0 both are theta_h = i^2/90 degrees
-    np.testing.assert_array_equal(found[:, 0, 0], np.arange(90) ** 2 / 90 <= 80)
+    np.testing.assert_array_equal(found[:, 0, 0], np.arange(90) ** 2 / 90 < 80)
 
 
 def test_within_leaves_out_what_is_below_the_horizon():
@@ -160,7 +160,7 @@ def test_within_on_other_layouts():
     found = table(np.ones((1, *grid.shape)), grid, "a").within(1.0)
     expected = (grid.theta_i <= 1.0)[:, None, None] & (grid.theta_o <= 1.0)[:, None] & np.ones(grid.shape, bool)
     np.testing.assert_array_equal(found, expected)
-    theta = np.radians([0.0, 80.0, 80.1, 95.0])
+    theta = np.radians([0.0, 79.9, 80.1, 95.0])
     v = np.stack([np.sin(theta), 0 * theta, np.cos(theta)], -1)
     up = np.tile([0.0, 0.0, 1.0], (4, 1))
     for wi, wo in ((v, up), (up, v)):
