@@ -105,7 +105,8 @@ class Row:
         case = np.arange(len(self.cases))
         if self.few:
             return case, FEW[[1, 14, -4]][case % 3]
-        return np.nonzero((case[:, None] + np.arange(len(WI))) % DERIVATIVE_STRIDE == 0)
+        picked = (case[:, None] + np.arange(len(WI))) % DERIVATIVE_STRIDE == 0
+        return np.nonzero(picked)[0], np.nonzero(picked)[1]
 
     def stacked(self, dtype: Any = np.float64) -> BRDF:
         """All cases as one instance with a leading axis of cases, and one channel."""
@@ -121,7 +122,7 @@ def _with(base: Mapping[str, float], *changes: Mapping[str, float]) -> list[Mapp
 def _random(model: type[BRDF]) -> list[Mapping[str, float]]:
     """Parameters from the search boxes, uniform in the logarithm where a fit works in it."""
     rng = np.random.default_rng(11)
-    cases = []
+    cases: list[Mapping[str, float]] = []
     for _ in range(RANDOM_PARAMETERS):
         case = {}
         for p in parameters_of(model):
@@ -284,4 +285,4 @@ PARTS = {
     masking: {"smith_correlated", "smith_lambda", "smith_separable", "vcavity"},
     fresnel: {"dielectric", "dielectric_f0", "schlick", "sgd_fresnel"},
 }
-"""Parts with a test of their own in test_masking.py and test_fresnel of test_models.py, by package."""
+"""Parts with a test of their own, in test_masking.py and in test_fresnel of test_models.py, by package."""

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import inspect
+from typing import Any
 
 import jax
 import jax.numpy as jnp
@@ -10,7 +11,7 @@ import numpy as np
 import pytest
 from brdfit import models
 from brdfit.geometry import from_directions
-from brdfit.models import BRDF, MODELS, parameters_of
+from brdfit.models import BRDF, MODELS, fresnel, parameters_of
 
 from . import cases, oracle
 from .cases import KINK, TABLE, WI, WO, Row
@@ -205,3 +206,44 @@ def test_absent_effects_cost_nothing():
             return m.diffuse / jnp.pi + m.specular * (d / (4 * jnp.sqrt(g.cos_i * g.cos_o)))
 
         assert program(w) == str(jax.make_jaxpr(ward)(w))
+
+
+@pytest.mark.parametrize("ior", [1.0, 1 + 1e-12, 1.001, 1.5, 100.0, 1001.0])
+def test_fresnel(ior: float):
+    """Cook's form as printed, in 40 digits; F0 at normal incidence, and 1 towards grazing. Schlick's two at both ends."""
+    with jax.enable_x64(True):
+        g = from_directions(WI, WO)
+        got = np.asarray(fresnel.dielectric(jnp.asarray(ior), g))
+        ends = from_directions(np.array([[0, 0, 1.0], [1.0, 0, 1e-9]]), np.array([[0, 0, 1.0], [-1.0, 0, 1e-9]]))
+        f0 = float(fresnel.dielectric_f0(jnp.asarray(ior)))
+        np.testing.assert_allclose(fresnel.schlick(jnp.asarray(f0), ends), [f0, 1], rtol=1e-8)  # 5 (1e-9) below 1
+        sgd = fresnel.sgd_fresnel(jnp.asarray(f0), jnp.asarray(0.3), ends)
+        np.testing.assert_allclose(sgd, [f0 - 0.3, 1], rtol=1e-8)
+        np.testing.assert_allclose(fresnel.dielectric(jnp.asarray(ior), ends)[0], f0, rtol=1e-13)
+    with oracle.mp.workdps(oracle.DIGITS):
+        n, want = oracle.mpf(ior), []
+        for c in np.asarray(g.cos_d):
+            c = oracle.mpf(float(c))
+            root = oracle.mp.sqrt(n**2 + c**2 - 1)
+            ratio = (c * (root + c) - 1) / (c * (root - c) + 1)
+            want.append(float((root - c) ** 2 / (root + c) ** 2 / 2 * (1 + ratio**2)))
+    np.testing.assert_allclose(got, want, rtol=1e-13)  # ten roundings, four of them counted twice by squares
+
+
+def test_smith_oracle_is_the_integral_as_written():
+    """The panels of the oracle against adaptive quadrature over theta_m of the formula as MODELS.md prints it."""
+    mp = oracle.mp
+    with mp.workdps(20):
+        alpha, gamma, view = oracle.mpf("0.3"), oracle.mpf("1.7"), mp.radians(70)
+
+        def area(theta: Any) -> Any:
+            if theta + view <= mp.pi / 2:
+                azimuth = 2 * mp.pi * mp.cos(view) * mp.cos(theta)
+            else:
+                phi0 = mp.acos(-mp.cot(view) * mp.cot(theta))
+                azimuth = 2 * (phi0 * mp.cos(view) * mp.cos(theta) + mp.sin(view) * mp.sin(theta) * mp.sin(phi0))
+            return oracle.gtr(alpha, gamma, mp.cos(theta)) * azimuth * mp.sin(theta)
+
+        direct = mp.cos(view) / mp.quad(area, [0, mp.radians(20), mp.pi / 2])
+        # 4e-11 is what the oracle leaves out at either end
+        assert float(oracle.gtr_masking(alpha, gamma, mp.cos(view)) / direct) == pytest.approx(1, rel=1e-10)
