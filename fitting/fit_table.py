@@ -41,6 +41,7 @@ EXACT = 1e-9
 
 _errors = eqx.filter_jit(loss_errors)
 
+
 @dataclass(frozen=True)
 class Prepared:
     """A table made ready for fits under one loss."""
@@ -121,9 +122,10 @@ def fit(
     """
     named_loss(loss)
     cls = model_class(model, (not table.isotropic) if anisotropic is None else anisotropic)
-    fixed = {n: np.asarray(v, float) for n, v in (fixed or {}).items()}
+    held: Named = {n: np.asarray(v, float) for n, v in (fixed or {}).items()}
     given = _given_start(cls, model, start)
-    _check_names(cls, {**fixed, **given, **dict(bounds or {})})
+    _check_names(cls, {**held, **given, **dict(bounds or {})})
+    _check_bounds(cls, bounds or {})
     begin = time.perf_counter()
     with jax.enable_x64(True), compilation() as compiled:
         ready = prepare(table, max_angle, measure, named_loss(loss))
@@ -138,19 +140,21 @@ def fit(
             "loss": bound_loss.name,
             "measure": measure,
             "max_angle": max_angle,
-            "fixed": tuple(fixed),
+            "fixed": tuple(held),
             "cells": {"used": int(used.sum()), "masked": int((~table.mask).sum()), "total": int(used.size)},
         }
         if not used.any():
             reason = f"no measured cell has both polar angles within {max_angle:g} degrees: nothing to fit"
-            return _nothing(frame, reason, {"load": table.seconds, "prepare": prepared - begin, "compile": 0.0, "solve": 0.0})
+            return _nothing(
+                frame, reason, {"load": table.seconds, "prepare": prepared - begin, "compile": 0.0, "solve": 0.0}
+            )
         box = tuple(sorted((n, float(a), float(b)) for n, (a, b) in (bounds or {}).items()))
-        forms = charts(cls, bool(fixed), box)
+        forms = charts(cls, bool(held), box)
         proposals = list(starts(cls, ready.summary, seed))
         if given:
             proposals.insert(0, {**proposals[0], **_per_channel(cls, given, table.channels)})
-        proposals = [{**p, **_per_channel(cls, fixed, table.channels)} for p in proposals]
-        ended = [settle(f) for f in _search(forms, ready.samples, bound_loss, proposals, frozenset(fixed))]
+        proposals = [{**p, **_per_channel(cls, held, table.channels)} for p in proposals]
+        ended = [settle(f) for f in _search(forms, ready.samples, bound_loss, proposals, frozenset(held))]
         found = [f for f, _ in ended]
         estimate = combine(cls, [part for _, part in ended])
         named = _named_losses(table.planes[:, used], bound_loss)
@@ -232,7 +236,9 @@ def _search(
         for chart in forms:
             lower, upper = chart.box(len(part))
             free = [c.parameter not in fixed for c, _ in chart.vector(len(part))]
-            begin = [chart.coordinates_of({n: v if v.ndim == 0 else v[part] for n, v in p.items()}, len(part)) for p in proposals]
+            begin = [
+                chart.coordinates_of({n: v if v.ndim == 0 else v[part] for n, v in p.items()}, len(part)) for p in proposals
+            ]
             box = Box(jnp.asarray(lower), jnp.asarray(upper), jnp.asarray(free))
             if fixed:  # a held parameter may lie outside the box that a fit searches
                 held = ~np.asarray(free)
@@ -270,6 +276,17 @@ def _check_names(cls: type[BRDF], values: Mapping[str, Any]) -> None:
     for name in values:
         if name not in known:
             raise ValueError(f"{cls.__name__} has no parameter {name!r}: it has {', '.join(known)}")
+
+
+def _check_bounds(cls: type[BRDF], bounds: Mapping[str, tuple[float, float]]) -> None:
+    for p in parameters_of(cls):
+        if p.name not in bounds:
+            continue
+        lower, upper = bounds[p.name]
+        if not (p.valid.lower <= lower < upper <= p.valid.upper):
+            raise ValueError(
+                f"{cls.__name__}: bounds of {p.name!r} must be lower < upper within {p.valid}, not {lower:g} and {upper:g}"
+            )
 
 
 def _per_channel(cls: type[BRDF], values: Named, channels: int) -> Named:
