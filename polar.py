@@ -72,7 +72,7 @@ class PolarStencil(eqx.Module):
         position = np.arccos(np.clip(cosine, -1, 1)) * (INTERVALS / max_angle)
         # the stencil's four points are index-1 .. index+2, so the first and last interval lean inwards
         index = np.clip(position.astype(np.int32), 1, INTERVALS - 2)
-        return PolarStencil(index, position - index, max_angle)  # type: ignore[arg-type]
+        return PolarStencil(index, position - index, max_angle)
 
     def tabulate(self, function: Callable[[Array], Array]) -> Array:
         """``function(cos(theta))`` on the uniform table, ``[INTERVALS + 1]``."""

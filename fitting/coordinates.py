@@ -69,7 +69,9 @@ class Chart:
 
     def parameters(self, own: Sequence[Array] | Array, shared: Sequence[Array] | Array) -> Scalars:
         """Parameters of one channel from its own coordinates ``[K]`` and the shared ones ``[S]``."""
-        values = {c.name: own[i] for i, c in enumerate(self.channel)} | {c.name: shared[i] for i, c in enumerate(self.shared)}
+        values = {c.name: own[i] for i, c in enumerate(self.channel)} | {
+            c.name: shared[i] for i, c in enumerate(self.shared)
+        }
         return self.to_parameters(values)
 
     def model(self, own: Sequence[Array] | Array, shared: Sequence[Array] | Array) -> BRDF:
@@ -88,7 +90,8 @@ class Chart:
         """Vector of given parameters, moved into the box where outside."""
         x = self.raw_coordinates(parameters, channels)
         lower, upper = self.box(channels)
-        return np.clip(np.nan_to_num(x, nan=0.0, posinf=1e300, neginf=-1e300), lower, upper)
+        inside: np.ndarray = np.clip(np.nan_to_num(x, nan=0.0, posinf=1e300, neginf=-1e300), lower, upper)
+        return inside
 
     def box(self, channels: int) -> tuple[np.ndarray, np.ndarray]:
         """Lower and upper bounds of a vector."""
@@ -117,9 +120,7 @@ def plain_chart(cls: type[BRDF], bounds: tuple[tuple[str, float, float], ...] = 
     return Chart(cls, tuple(coordinates), to_parameters, from_parameters)
 
 
-def _rewritten(
-    chart: Chart, to_parameters: Map, from_parameters: Map, **boxes: tuple[float, float]
-) -> Chart:
+def _rewritten(chart: Chart, to_parameters: Map, from_parameters: Map, **boxes: tuple[float, float]) -> Chart:
     """A chart with other maps, and another box for the coordinates named."""
     coordinates = tuple(
         replace(c, lower=boxes[c.name][0], upper=boxes[c.name][1]) if c.name in boxes else c for c in chart.coordinates
@@ -195,7 +196,7 @@ def _sgd_chart() -> Chart:
 
 
 def _ashikhmin_shirley_chart(cls: type[BRDF]) -> Chart:
-    """Diffuse (1 - specular) in place of diffuse: the BRDF is affine in it, and diffuse is not determined as specular -> 1."""
+    """Diffuse (1 - specular) in place of diffuse, which is not determined as specular -> 1; the BRDF is affine in it."""
     plain = plain_chart(cls)
 
     def to_parameters(x: Scalars) -> Scalars:

@@ -236,7 +236,9 @@ def _sum_over_blocks(samples: Samples, span: Span, one: Callable[[Geometry, Arra
         return jax.tree.map(jnp.add, total, one(*samples.block(i)))
 
     shapes = jax.eval_shape(lambda: one(*samples.block(jnp.zeros((), int))))
-    return jax.lax.fori_loop(span.first, span.first + span.count, step, jax.tree.map(lambda s: jnp.zeros(s.shape, s.dtype), shapes))
+    return jax.lax.fori_loop(
+        span.first, span.first + span.count, step, jax.tree.map(lambda s: jnp.zeros(s.shape, s.dtype), shapes)
+    )
 
 
 def gram(problem: Problem, x: Vector, span: Span) -> Float[Array, "n+1 n+1"]:
@@ -289,7 +291,8 @@ def factor(g: Float[Array, "m m"]) -> Float[Array, "m m"]:
     diagonal = jnp.diag(g)
     scale = jnp.sqrt(jnp.where(diagonal > 0, diagonal, 1.0))
     values, vectors = jnp.linalg.eigh(g / scale[:, None] / scale)
-    return jnp.sqrt(jnp.maximum(values, 0.0))[:, None] * vectors.T * scale
+    u: Array = jnp.sqrt(jnp.maximum(values, 0.0))[:, None] * vectors.T * scale
+    return u
 
 
 def gram_residual(problem: Problem, span: Span) -> Callable[[Vector], Array]:

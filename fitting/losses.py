@@ -31,7 +31,7 @@ class Loss(eqx.Module):
     weigh: Callable[[Geometry], Array] | None = eqx.field(static=True, default=None)
     """Weight relative to the table's measure; None for 1."""
     transform: Callable[[Array, Geometry], Array] | None = eqx.field(static=True, default=None)
-    """T with residual T(f) - T(m), on values ``[C, ...]`` that the geometry broadcasts to; None where the loss has no such form."""
+    """T with residual T(f) - T(m), on values ``[C, ...]`` that the geometry broadcasts to; None if there is none."""
     inverse: Callable[[Array, Geometry], Array] | None = eqx.field(static=True, default=None)
     """The value f of T(f)."""
     separable: bool = eqx.field(static=True, default=True)

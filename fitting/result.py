@@ -161,7 +161,9 @@ def from_record(record: dict[str, Any]) -> Fit:
         labels=tuple(record.get("labels", ())),
         correlation=_array(record.get("correlation", [])),
         starts=record.get("starts", 0),
-        optima=tuple(Optimum(float("nan") if o["error"] is None else o["error"], o["starts"]) for o in record.get("optima", [])),
+        optima=tuple(
+            Optimum(float("nan") if o["error"] is None else o["error"], o["starts"]) for o in record.get("optima", [])
+        ),
         passes=record.get("passes", 0),
         path=record.get("path", "exact"),
         shift=record.get("shift") or 0.0,
@@ -183,4 +185,8 @@ def _plain(value: Any) -> Any:
 
 def _array(value: Any) -> Reals:
     """Array of nested lists in which None stands for NaN."""
-    return np.array(value, dtype=object).astype(float) if np.ndim(value) else np.asarray(np.nan if value is None else value, float)
+    return (
+        np.array(value, dtype=object).astype(float)
+        if np.ndim(value)
+        else np.asarray(np.nan if value is None else value, float)
+    )

@@ -69,7 +69,8 @@ class Samples(eqx.Module):
     def channel(self, c: int) -> Samples:
         """The same cells with channel c alone."""
         part = slice(c, c + 1)
-        return eqx.tree_at(lambda s: (s.measured, s.remainder), self, (self.measured[:, part], self.remainder[part]))
+        one: Samples = eqx.tree_at(lambda s: (s.measured, s.remainder), self, (self.measured[:, part], self.remainder[part]))
+        return one
 
 
 def samples(table: Table, max_angle: float, measure: str) -> tuple[Samples, NDArray[np.bool_]]:
@@ -143,10 +144,10 @@ class _Fold:
 
 
 def _grid_samples(table: Table, grid: HalfDifferenceGrid, used: NDArray[np.bool_], weight: Reals, limit: float) -> Samples:
-    geometry, (h, d) = _grid_geometry(grid.theta_h.tobytes(), grid.theta_d.tobytes(), grid.phi_d.tobytes(), limit)
-    part = np.ix_(h, d)
-    fold = _Fold((len(h), len(d), len(grid.phi_d)))
-    measured = np.where(used[part], table.planes[(slice(None), *part)], 0.0)
+    geometry, rows = _grid_geometry(grid.theta_h.tobytes(), grid.theta_d.tobytes(), grid.phi_d.tobytes(), limit)
+    part = np.ix_(*rows)
+    fold = _Fold((*(len(r) for r in rows), len(grid.phi_d)))
+    measured = np.where(used[part], _block(table.planes, rows), 0.0)
     none = jnp.zeros(table.channels)
     return Samples(geometry, fold(measured), fold(weight[part]), banded=fold.banded, band_axes=(0, 2), remainder=none)
 
@@ -172,7 +173,7 @@ def compress(cells: Samples, table: Table, used: NDArray[np.bool_], max_angle: f
     relative = loss.weight(at_cells)
     weight = weight if relative is None else weight * np.asarray(relative)
     rule = row_rule(np.where(grid.phi_d > np.pi, 2 * np.pi - grid.phi_d, grid.phi_d), weight, k)
-    planes = np.where(used[part], table.planes[(slice(None), *part)], 0.0)
+    planes = np.where(used[part], _block(table.planes, rows), 0.0)
     transformed = np.asarray(loss.transform(jnp.asarray(planes), at_cells))
     coefficients = rule.project(transformed)
     remainder = (weight * transformed**2).sum((1, 2, 3)) - (coefficients**2).sum((1, 2, 3))
@@ -207,10 +208,16 @@ def compress(cells: Samples, table: Table, used: NDArray[np.bool_], max_angle: f
     return Samples(joined, measured, share, cells.banded, cells.band_axes, left, compressed=count)
 
 
+def _block(planes: Reals, rows: tuple[NDArray[np.int64], NDArray[np.int64]]) -> Reals:
+    """The rows of theta_h and theta_d that are fitted, of ``[C, H, D, P]``."""
+    return planes[:, rows[0]][:, :, rows[1]]
+
+
 def _plain_geometry(h: Reals, d: Reals, phi: Reals, fitted: NDArray[np.bool_]) -> Geometry:
     """Geometry of half/difference angles; where not fitted, of the normal direction."""
     cos_i, cos_o = (jnp.asarray(np.where(fitted, c, 1.0)) for c in polar_cosines(h, d, phi))
-    return Geometry(cos_i, cos_o, *(jnp.asarray(a) for a in (np.cos(h), np.sin(h) ** 2, np.cos(d), np.sin(d) ** 2)))
+    cos_h, sin2_h, cos_d, sin2_d = (jnp.asarray(a) for a in (np.cos(h), np.sin(h) ** 2, np.cos(d), np.sin(d) ** 2))
+    return Geometry(cos_i, cos_o, cos_h, sin2_h, cos_d, sin2_d)
 
 
 @lru_cache(maxsize=1)

@@ -112,7 +112,7 @@ def search(problems: list[tuple[Problem, Box, list[NDArray[np.float64]]]]) -> Fo
         else:
             distinct.append(candidate)
             counts.append(1)
-    finished = []
+    finished: list[tuple[float, int, Problem, Box, Minimum]] = []
     passes = 0
     for (cost, problem, box, m), count in zip(distinct[:FINISHED], counts, strict=False):
         if finished and not cost <= WORTH * distinct[0][0]:

@@ -42,7 +42,7 @@ class _State(eqx.Module):
     """Whether the Hessian with ``second`` foretold the last step better than J^T J alone."""
 
 
-class BoxDescent(optx.AbstractDescent):  # type: ignore[misc]
+class BoxDescent(optx.AbstractDescent[Any, Any, Any]):
     """Damped Newton step in a box.
 
     Elements at a bound that the gradient pushes outwards are held, and elements that the step would carry out of the box
@@ -83,7 +83,7 @@ class BoxDescent(optx.AbstractDescent):  # type: ignore[misc]
         second = jnp.where(learn, second + jnp.outer(v, v) / jnp.where(learn, vs, 1.0), second)
         return _State(y, cost, gradient, matrix, second, learn & (jnp.abs(bent - gained) <= jnp.abs(plain - gained)))
 
-    def step(self, step_size: Array, state: _State) -> tuple[Vector, optx.RESULTS]:
+    def step(self, step_size: Array, state: _State) -> tuple[Vector, Any]:
         """Step for damping ``damping``/step_size."""
         diagonal = jnp.diag(state.matrix)
         # Guard: a parameter without any effect has a zero column; it gets scale 1 and stays where it is.
@@ -115,7 +115,7 @@ class BoxDescent(optx.AbstractDescent):  # type: ignore[misc]
         return jnp.where(self.box.free, jnp.clip(d, lower, upper), 0.0)
 
 
-class BoxLevenbergMarquardt(optx.AbstractGaussNewton):  # type: ignore[misc]
+class BoxLevenbergMarquardt(optx.AbstractGaussNewton[Any, Any, Any]):
     """Levenberg-Marquardt that stops on what matters: ``rtol`` is the relative decrease of the cost that still counts.
 
     Successful when an accepted, hardly damped step lowers the cost by less than ``rtol`` relative or by no more than
@@ -123,11 +123,11 @@ class BoxLevenbergMarquardt(optx.AbstractGaussNewton):  # type: ignore[misc]
     rounding.
     """
 
-    rtol: Array | float
+    rtol: Any
     atol: float
     norm: Callable[[Any], Array]
     descent: BoxDescent
-    search: optx.LinearTrustRegion
+    search: optx.LinearTrustRegion[Any]
     verbose: Callable[..., None]
     patience: int
 
@@ -143,7 +143,8 @@ class BoxLevenbergMarquardt(optx.AbstractGaussNewton):  # type: ignore[misc]
 
     def step(self, fn: Any, y: Vector, args: Any, options: Any, state: Any, tags: Any) -> Any:
         """One step of Gauss-Newton, then the test whether to stop."""
-        new_y, new, aux = optx.AbstractGaussNewton.step(self, fn, y, args, options, state, tags)
+        result: Any = optx.AbstractGaussNewton.step(self, fn, y, args, options, state, tags)
+        new_y, new, aux = result
         before, after = jnp.sum(state.f_info.residual**2), jnp.sum(new.f_info.residual**2)
         accepted = new.num_steps_since_acceptance == 0
         damped = self.descent.damping > 1e-2 * new.search_state.step_size
@@ -178,7 +179,7 @@ def minimise(
 ) -> Minimum:
     """Minimise |residual(x)|^2 over a box, from an x inside it."""
     solver = BoxLevenbergMarquardt(box, rtol, damping)
-    solution = optx.least_squares(lambda y, _: residual(y), solver, x, max_steps=max_steps, throw=False)
+    solution: Any = optx.least_squares(lambda y, _: residual(y), solver, x, max_steps=max_steps, throw=False)
     end = solution.state.f_info
     columns = end.jac.as_matrix()
     gradient, cost = columns.T @ end.residual, jnp.sum(end.residual**2)
@@ -187,9 +188,8 @@ def minimise(
     size = jnp.sum(columns**2, 0) * cost
     moves = box.free & ~outward & (size > 0)
     cosine = jnp.where(moves, jnp.abs(gradient) / jnp.sqrt(jnp.where(moves, size, 1.0)), 0.0)
-    return Minimum(
-        x, cost, jnp.max(cosine, initial=0.0), solution.stats["num_steps"], solution.result == optx.RESULTS.successful
-    )
+    stopped = jnp.asarray(solution.result == optx.RESULTS.successful)
+    return Minimum(x, cost, jnp.max(cosine, initial=0.0), solution.stats["num_steps"], stopped)
 
 
 __all__ = ["Box", "BoxDescent", "BoxLevenbergMarquardt", "Minimum", "minimise"]

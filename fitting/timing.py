@@ -22,10 +22,10 @@ class Compilation:
 def _listen() -> None:
     import jax.monitoring
 
-    def record(event: str, seconds: float, **_: object) -> None:
+    def record(event: str, duration_secs: float, **kwargs: str | int) -> None:
         current: Compilation | None = getattr(_local, "current", None)
         if current is not None and event.startswith("/jax/core/compile"):
-            current.seconds += seconds
+            current.seconds += duration_secs
 
     jax.monitoring.register_event_duration_secs_listener(record)
 

@@ -85,7 +85,7 @@ def parameter(
 
 def parameters_of(model: type[eqx.Module] | eqx.Module) -> tuple[Parameter, ...]:
     """The declared parameters of a model class or instance, in order."""
-    return tuple(replace(f.metadata["parameter"], name=f.name) for f in fields(model) if "parameter" in f.metadata)  # type: ignore[arg-type]
+    return tuple(replace(f.metadata["parameter"], name=f.name) for f in fields(model) if "parameter" in f.metadata)
 
 
 class BRDF(eqx.Module):
@@ -123,12 +123,13 @@ def channel_axes(model: BRDF, channel: Any = 0, shared: Any = None) -> BRDF:
     """A pytree like ``model`` with ``channel`` at its per-channel parameters and ``shared`` at the others."""
     per_channel = {p.name: p.per_channel for p in parameters_of(model)}
     names = list(per_channel)
-    return eqx.tree_at(
+    marked: BRDF = eqx.tree_at(
         lambda m: [getattr(m, n) for n in names],
         model,
         [channel if per_channel[n] else shared for n in names],
         is_leaf=lambda x: x is None,
     )
+    return marked
 
 
 def channels(model: BRDF) -> int:

@@ -36,7 +36,7 @@ class Table:
     @property
     def channels(self) -> int:
         """Number of channels C."""
-        return self.planes.shape[0]
+        return int(self.planes.shape[0])
 
     @property
     def values(self) -> NDArray[np.float64]:
@@ -60,7 +60,8 @@ class Table:
         else:
             wi, wo = self.layout.directions()
             ci, co = wi[..., 2], wo[..., 2]
-        return self.mask & (ci > limit) & (co > limit) & (ci > 0) & (co > 0)
+        kept: NDArray[np.bool_] = self.mask & (ci > limit) & (co > limit) & (ci > 0) & (co > 0)
+        return kept
 
 
 def table(planes: NDArray[np.float64], layout: Layout, material: str, **provenance: object) -> Table:

@@ -5,6 +5,7 @@ from __future__ import annotations
 from collections.abc import Callable
 
 import jax.numpy as jnp
+import numpy as np
 from jaxtyping import Array, Float
 
 from ...geometry import Geometry
@@ -40,7 +41,7 @@ def smith_lambda(ndf: NDF, cosine: Float[Array, "..."]) -> Float[Array, "..."]:
     sin2_m, cos2_m = c2 / norm, s2 * cos2_t / norm
     # Guard: at exactly normal incidence every m of the integral lies on the horizon, where D may divide by its cosine;
     # the factor s2 = 0 makes the value 0 (tests/test_masking.py::test_normal_incidence).
-    cos2_m = jnp.where(cos2_m > 0, cos2_m, jnp.finfo(cosine.dtype).tiny ** 0.25)
+    cos2_m = jnp.where(cos2_m > 0, cos2_m, float(np.finfo(cosine.dtype).tiny) ** 0.25)
     return 2 * c2[..., 0] * s2[..., 0] * jnp.sum(weight * ndf(sin2_m, cos2_m) / norm**2, -1)
 
 
