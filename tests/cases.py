@@ -12,10 +12,9 @@ from typing import Any
 
 import numpy as np
 from brdfit.models import BRDF, MODELS, fresnel, masking, ndf, parameters_of
+from brdfit.stability import oracle
 from jaxtyping import ArrayLike
 from numpy.typing import NDArray
-
-from . import oracle
 
 Reals = NDArray[np.float64]
 

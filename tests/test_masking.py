@@ -8,9 +8,10 @@ import numpy as np
 import pytest
 from brdfit.geometry import from_directions
 from brdfit.models import masking, ndf
+from brdfit.stability import oracle
 from mpmath import mpf
 
-from . import cases, oracle
+from . import cases
 
 COSINES = np.sin(np.pi / 2 - np.radians([5.0, 30.0, 60.0, 80.0, 89.0, 89.995]))
 

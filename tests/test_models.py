@@ -12,8 +12,9 @@ import pytest
 from brdfit import models
 from brdfit.geometry import from_directions
 from brdfit.models import BRDF, MODELS, fresnel, parameters_of
+from brdfit.stability import oracle
 
-from . import cases, oracle
+from . import cases
 from .cases import KINK, TABLE, WI, WO, Row
 
 rows = pytest.mark.parametrize("row", TABLE, ids=lambda r: r.name)

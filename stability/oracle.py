@@ -163,7 +163,7 @@ def sgd_masking(alpha: Any, p: Any, cosine: Any) -> Any:
 # Models: one channel, directions as triples ---------------------------------------------------------------------------
 
 
-def _half(l: Vector, v: Vector) -> tuple[Any, Any, Any, Any]:  # noqa: E741
+def _half(l: Vector, v: Vector) -> tuple[Any, Any, Any, Any]:
     """h = (l + v)/|l + v| and theta_d, with tan(theta_d) = |l - v|/|l + v|."""
     total = [a + b for a, b in zip(l, v, strict=True)]
     length = mp.sqrt(mp.fsum(a * a for a in total))
@@ -175,61 +175,86 @@ def _theta(hx: Any, hy: Any, hz: Any) -> Any:
     return mp.atan2(mp.sqrt(hx**2 + hy**2), hz)
 
 
-def _schlick(f0: Any, cosine: Any) -> Any:
+def schlick(f0: Any, cosine: Any) -> Any:
     return f0 + (1 - f0) * (1 - cosine) ** 5
 
 
-def lambert_model(l: Vector, v: Vector, diffuse: Any) -> Any:  # noqa: E741
-    return diffuse / mp.pi
+def sgd_fresnel(f0: Any, f1: Any, cosine: Any) -> Any:
+    """Bagher et al. (2012), eq. 12."""
+    return schlick(f0, cosine) - f1 * cosine
 
 
-def gtr_model(l: Vector, v: Vector, diffuse: Any, specular: Any, alpha: Any, gamma: Any) -> Any:  # noqa: E741
+def dielectric(ior: Any, cosine: Any) -> Any:
+    """Cook & Torrance (1982), eq. 3."""
+    g = mp.sqrt(ior**2 + cosine**2 - 1)
+    ratio = (cosine * (g + cosine) - 1) / (cosine * (g - cosine) + 1)
+    return (g - cosine) ** 2 / (g + cosine) ** 2 / 2 * (1 + ratio**2)
+
+
+def vcavity(l: Vector, v: Vector) -> Any:
+    """Cook & Torrance (1982), eq. 4."""
     *h, theta_d = _half(l, v)
-    light, viewer = (1 / gtr_masking(alpha, gamma, c) - 1 for c in (l[2], v[2]))
-    g = 1 / (1 + light + viewer)
-    f = _schlick(specular, mp.cos(theta_d))
-    return diffuse / mp.pi + f * gtr(alpha, gamma, h[2]) * g / (4 * l[2] * v[2])
+    return min(1, 2 * h[2] * v[2] / mp.cos(theta_d), 2 * h[2] * l[2] / mp.cos(theta_d))
 
 
-def sgd_model(l: Vector, v: Vector, diffuse: Any, specular: Any, alpha: Any, p: Any, f0: Any, f1: Any) -> Any:  # noqa: E741
-    *h, theta_d = _half(l, v)
-    g = sgd_masking(alpha, p, l[2]) * sgd_masking(alpha, p, v[2])
-    c = mp.cos(theta_d)
-    f = f0 + (1 - f0) * (1 - c) ** 5 - f1 * c
-    return diffuse / mp.pi + specular * f * sgd(alpha, p, h[2]) * g / (4 * l[2] * v[2])
-
-
-def abc_model(l: Vector, v: Vector, diffuse: Any, specular: Any, b: Any, c: Any, ior: Any) -> Any:  # noqa: E741
-    *h, theta_d = _half(l, v)
-    cd = mp.cos(theta_d)
-    g = mp.sqrt(ior**2 + cd**2 - 1)
-    f = (g - cd) ** 2 / (g + cd) ** 2 / 2 * (1 + (cd * (g + cd) - 1) ** 2 / (cd * (g - cd) + 1) ** 2)
-    masking = min(1, 2 * h[2] * v[2] / cd, 2 * h[2] * l[2] / cd)
-    return diffuse / mp.pi + specular * f * abc(b, c, h[2]) * masking / (4 * l[2] * v[2])
-
-
-def ward_model(l: Vector, v: Vector, diffuse: Any, specular: Any, alpha_x: Any, alpha_y: Any) -> Any:  # noqa: E741
+def ward_lobe(alpha_x: Any, alpha_y: Any, l: Vector, v: Vector) -> Any:
+    """The exponential of Ward (1992), eq. 5, over pi alpha_x alpha_y."""
     hx, hy, hz, _ = _half(l, v)
     theta, phi = _theta(hx, hy, hz), mp.atan2(hy, hx)
     slope = mp.tan(theta) ** 2 * (mp.cos(phi) ** 2 / alpha_x**2 + mp.sin(phi) ** 2 / alpha_y**2)
-    return diffuse / mp.pi + specular * mp.exp(-slope) / (4 * mp.pi * alpha_x * alpha_y * mp.sqrt(l[2] * v[2]))
+    return mp.exp(-slope) / (mp.pi * alpha_x * alpha_y)
+
+
+def phong_lobe(exponent_x: Any, exponent_y: Any, l: Vector, v: Vector) -> Any:
+    """The power of Ashikhmin & Shirley (2000), eq. 4, as a density of half vectors."""
+    hx, hy, hz, _ = _half(l, v)
+    across = hx**2 + hy**2
+    exponent = (exponent_x * hx**2 + exponent_y * hy**2) / across if across else mpf(0)  # 1 to any power
+    return mp.sqrt((exponent_x + 1) * (exponent_y + 1)) / (2 * mp.pi) * hz**exponent
+
+
+def lambert_model(l: Vector, v: Vector, diffuse: Any) -> Any:
+    return diffuse / mp.pi
+
+
+def gtr_model(l: Vector, v: Vector, diffuse: Any, specular: Any, alpha: Any, gamma: Any) -> Any:
+    *h, theta_d = _half(l, v)
+    light, viewer = (1 / gtr_masking(alpha, gamma, c) - 1 for c in (l[2], v[2]))
+    g = 1 / (1 + light + viewer)
+    f = schlick(specular, mp.cos(theta_d))
+    return diffuse / mp.pi + f * gtr(alpha, gamma, h[2]) * g / (4 * l[2] * v[2])
+
+
+def sgd_model(l: Vector, v: Vector, diffuse: Any, specular: Any, alpha: Any, p: Any, f0: Any, f1: Any) -> Any:
+    *h, theta_d = _half(l, v)
+    g = sgd_masking(alpha, p, l[2]) * sgd_masking(alpha, p, v[2])
+    c = mp.cos(theta_d)
+    f = sgd_fresnel(f0, f1, c)
+    return diffuse / mp.pi + specular * f * sgd(alpha, p, h[2]) * g / (4 * l[2] * v[2])
+
+
+def abc_model(l: Vector, v: Vector, diffuse: Any, specular: Any, b: Any, c: Any, ior: Any) -> Any:
+    *h, theta_d = _half(l, v)
+    f = dielectric(ior, mp.cos(theta_d))
+    return diffuse / mp.pi + specular * f * abc(b, c, h[2]) * vcavity(l, v) / (4 * l[2] * v[2])
+
+
+def ward_model(l: Vector, v: Vector, diffuse: Any, specular: Any, alpha_x: Any, alpha_y: Any) -> Any:
+    return diffuse / mp.pi + specular * ward_lobe(alpha_x, alpha_y, l, v) / (4 * mp.sqrt(l[2] * v[2]))
 
 
 def ashikhmin_shirley_model(
-    l: Vector,  # noqa: E741
+    l: Vector,
     v: Vector,
     diffuse: Any,
     specular: Any,
     exponent_x: Any,
     exponent_y: Any,
 ) -> Any:
-    hx, hy, hz, theta_d = _half(l, v)
+    *_, theta_d = _half(l, v)
     body = 28 * diffuse / (23 * mp.pi) * (1 - specular) * (1 - (1 - v[2] / 2) ** 5) * (1 - (1 - l[2] / 2) ** 5)
-    across = hx**2 + hy**2
-    exponent = (exponent_x * hx**2 + exponent_y * hy**2) / across if across else mpf(0)  # 1 to any power
-    lobe = mp.sqrt((exponent_x + 1) * (exponent_y + 1)) / (8 * mp.pi) * hz**exponent
     cd = mp.cos(theta_d)
-    return body + lobe * _schlick(specular, cd) / (cd * max(l[2], v[2]))
+    return body + phong_lobe(exponent_x, exponent_y, l, v) * schlick(specular, cd) / (4 * cd * max(l[2], v[2]))
 
 
 MODELS: dict[str, Callable[..., Any]] = {
@@ -237,9 +262,9 @@ MODELS: dict[str, Callable[..., Any]] = {
     "GTR": gtr_model,
     "SGD": sgd_model,
     "ABC": abc_model,
-    "Ward": lambda l, v, diffuse, specular, alpha: ward_model(l, v, diffuse, specular, alpha, alpha),  # noqa: E741
+    "Ward": lambda l, v, diffuse, specular, alpha: ward_model(l, v, diffuse, specular, alpha, alpha),
     "WardAnisotropic": ward_model,
-    "AshikhminShirley": lambda l, v, diffuse, specular, exponent: ashikhmin_shirley_model(  # noqa: E741
+    "AshikhminShirley": lambda l, v, diffuse, specular, exponent: ashikhmin_shirley_model(
         l, v, diffuse, specular, exponent, exponent
     ),
     "AshikhminShirleyAnisotropic": ashikhmin_shirley_model,
