@@ -120,7 +120,11 @@ def test_an_interrupted_run_keeps_what_was_finished(small_file, tmp_path):
     for path in files:
         path.hardlink_to(small_file)
     out = tmp_path / "out"
-    command = [sys.executable, "-m", "brdfit", "fit", *map(str, files), "--model", "lambert", "--out", str(out)]
+    # a shell starts background jobs with interrupts ignored, and children inherit that
+    listen = (
+        "import signal; signal.signal(signal.SIGINT, signal.default_int_handler); from brdfit import __main__ as m; m.main()"
+    )
+    command = [sys.executable, "-c", listen, "fit", *map(str, files), "--model", "lambert", "--out", str(out)]
     with subprocess.Popen(command, stderr=subprocess.PIPE, stdout=subprocess.PIPE, text=True) as running:
         assert running.stderr.readline().startswith("[1/60]")
         running.send_signal(signal.SIGINT)
