@@ -25,7 +25,7 @@ from .losses import LOSSES, Loss, LossFunction, named_loss
 from .result import Fit, Named, Optimum
 from .samples import Samples, compress, samples
 from .search import Found, Stage, search, solve
-from .solver import Box
+from .solver import Box, Minimum
 from .starts import Summary, starts, summarise
 from .timing import compilation
 
@@ -36,8 +36,8 @@ OPTIMAL = 1e-4
 error by less than half the square of it, 5e-9 relative."""
 TOLERATED = 0.1
 """Standard errors by which compression of the table may move a parameter."""
-EXACT = 1e-9
-"""Error below which a fit is exact to rounding."""
+EXACT = 1e-8
+"""Error, relative to what the parameters do to the residual, below which a fit is exact: polar tables are good to 3e-9."""
 
 _errors = eqx.filter_jit(loss_errors)
 
@@ -309,12 +309,14 @@ def _per_channel(cls: type[BRDF], values: Named, channels: int) -> Named:
 
 def _verdict(found: list[Found]) -> tuple[bool, str]:
     """Whether the fit converged, and why it stopped, in words; the worst channel speaks for all."""
-    worst = max(found, key=lambda f: (not bool(f.minimum.stopped), float(f.minimum.optimality)))
-    end = worst.minimum
+    return min((_ending(f.minimum) for f in sorted(found, key=lambda f: -float(f.minimum.cost))), key=lambda v: v[0])
+
+
+def _ending(end: Minimum) -> tuple[bool, str]:
     error, cosine, steps = float(np.sqrt(end.cost)), float(end.optimality), int(end.steps)
     if not np.isfinite(error) or error > 1e140:
         return False, "no start gave a finite error: the model is not defined where the data are"
-    if error < EXACT:
+    if error <= EXACT * float(end.scale):
         return True, f"exact fit: the error is {error:.1g}, which is rounding"
     if not bool(end.stopped):
         return False, f"stopped at the limit of {steps} steps; the gradient is still {cosine:.1g} (cosine to the residual)"

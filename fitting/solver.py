@@ -150,7 +150,7 @@ class BoxLevenbergMarquardt(optx.AbstractGaussNewton[Any, Any, Any]):
         damped = self.descent.damping > 1e-2 * new.search_state.step_size
         # A column times its coordinate is what 100 % of it does to the residual, and sets the size of rounding
         # (tests/test_solver.py::test_exact_problems_stop_at_rounding).
-        rounding = ROUNDING * jnp.sqrt(jnp.max(jnp.sum(new.f_info.jac.as_matrix() ** 2, 0) * new_y**2, initial=0.0))
+        rounding = ROUNDING * _scale(new.f_info.jac.as_matrix(), new_y)
         little = self.rtol * before + 2 * rounding * jnp.sqrt(before)
         stalled = accepted & ~state.first_step & ~damped & (before - after <= little)
         # A step damped down to nothing counts as accepted, and would be for ever (tests/test_solver.py::test_stops_at_once).
@@ -172,6 +172,8 @@ class Minimum(eqx.Module):
     steps: Array
     stopped: Array
     """Whether it stopped by itself, not by the limit of steps."""
+    scale: Array
+    """What 100 % of the coordinate that matters most does to the residual: the size that an error is small against."""
 
 
 def minimise(
@@ -189,7 +191,13 @@ def minimise(
     moves = box.free & ~outward & (size > 0)
     cosine = jnp.where(moves, jnp.abs(gradient) / jnp.sqrt(jnp.where(moves, size, 1.0)), 0.0)
     stopped = jnp.asarray(solution.result == optx.RESULTS.successful)
-    return Minimum(x, cost, jnp.max(cosine, initial=0.0), solution.stats["num_steps"], stopped)
+    stopped = solution.result == optx.RESULTS.successful
+    return Minimum(x, cost, jnp.max(cosine, initial=0.0), solution.stats["num_steps"], stopped, _scale(columns, x))
+
+
+def _scale(columns: Array, x: Vector) -> Array:
+    """Largest norm of a column of the Jacobian times its coordinate."""
+    return jnp.sqrt(jnp.max(jnp.sum(columns**2, 0) * x**2, initial=0.0))
 
 
 __all__ = ["Box", "BoxDescent", "BoxLevenbergMarquardt", "Minimum", "minimise"]
