@@ -16,10 +16,7 @@ only what T(f) has beyond degree k - 1 in phi_d: the exact table judges that at 
 
 from __future__ import annotations
 
-from collections import OrderedDict
 from dataclasses import dataclass
-from hashlib import blake2b
-from threading import Lock
 
 import numpy as np
 from numpy.typing import NDArray
@@ -28,81 +25,96 @@ Reals = NDArray[np.float64]
 
 
 @dataclass(frozen=True)
-class RowRule:
-    """Gauss rules of all rows, and what projects a measured row on its polynomials."""
-
-    phi: Reals
-    """Nodes ``[H, D, k]``, radians in [0, pi]."""
-    weight: Reals
-    """Weights ``[H, D, k]``."""
-    analysis: Reals
-    """w_j p_l(phi_j), ``[H, D, P, k]``: coefficients of a row's values in the orthonormal polynomials."""
-    synthesis: Reals
-    """p_l at the nodes, ``[H, D, l, k]``."""
-
-    def project(self, transformed: Reals) -> Reals:
-        """Coefficients ``[C, H, D, l]`` of rows ``[C, H, D, P]``."""
-        rows = np.moveaxis(transformed, 0, 2)
-        return np.moveaxis(rows @ self.analysis, 2, 0)
-
-    def at_nodes(self, coefficients: Reals) -> Reals:
-        """Values ``[C, H, D, k]`` at the nodes."""
-        return np.moveaxis(np.moveaxis(coefficients, 0, 2) @ self.synthesis, 2, 0)
-
-
-_rules: OrderedDict[bytes, RowRule] = OrderedDict()
-_lock = Lock()
-
-
-def row_rule(phi: Reals, weight: Reals, k: int) -> RowRule:
-    """The k-point rule of every row of weights ``[H, D, P]`` at ``phi`` ``[P]`` in [0, pi].
-
-    The last two are kept: tables of a batch often share grid and mask.
+class RowRules:
+    """Gauss rules for all rows of a table. Rows with the same fitted cells and relative weights share one: a MERL table
+    has some ninety.
     """
-    key = blake2b(weight.tobytes() + phi.tobytes() + bytes([k])).digest()
-    with _lock:
-        if key not in _rules:
-            _rules[key] = _row_rule(phi, weight, k)
-            while len(_rules) > 2:
-                _rules.popitem(last=False)
-        _rules.move_to_end(key)
-        return _rules[key]
+
+    pattern: NDArray[np.intp]
+    """Which rule each row uses, ``[H, D]``."""
+    scale: Reals
+    """Weight of each row relative to its rule, ``[H, D]``."""
+    nodes: Reals
+    """phi of the nodes, ``[rules, k]``, radians in [0, pi]."""
+    weights: Reals
+    """Weights of the nodes, ``[rules, k]``."""
+    analysis: Reals
+    """w_j p_l(phi_j), ``[rules, P, l]``: coefficients of a row's values in the orthonormal polynomials."""
+    synthesis: Reals
+    """p_l at the nodes, ``[rules, l, k]``."""
+
+    @property
+    def phi(self) -> Reals:
+        """Nodes ``[H, D, k]``."""
+        return np.asarray(self.nodes[self.pattern])
+
+    @property
+    def weight(self) -> Reals:
+        """Weights ``[H, D, k]``."""
+        return np.asarray(self.weights[self.pattern] * self.scale[..., None])
+
+    def compress(self, transformed: Reals, at: slice) -> tuple[Reals, Reals]:
+        """Values ``[C, h, D, k]`` at the nodes of the rows ``at`` of theta_h, ``[C, h, D, P]``, and the weighted square sum
+        ``[C]`` that they stand for.
+        """
+        c, h, d, _ = transformed.shape
+        k = self.nodes.shape[1]
+        rows = transformed.reshape(c, h * d, -1)
+        out = np.zeros((c, h * d, k))
+        kept = np.zeros(c)
+        pattern, scale = self.pattern[at].ravel(), self.scale[at].ravel()
+        for rule in np.unique(pattern):
+            same = np.flatnonzero(pattern == rule)
+            coefficients = rows[:, same] @ self.analysis[rule]
+            out[:, same] = coefficients @ self.synthesis[rule]
+            kept += (coefficients**2).sum(-1) @ scale[same]
+        return out.reshape(c, h, d, k), kept
 
 
-def _row_rule(phi: Reals, weight: Reals, k: int) -> RowRule:
+def row_rules(phi: Reals, weight: Reals, k: int) -> RowRules:
+    """The k-point rules of the rows of weights ``[H, D, P]`` at ``phi`` ``[P]`` in [0, pi]."""
+    scale = weight.max(-1)
+    # rounded: the steps of a grid differ in their last bits
+    relative = np.round(weight / np.where(scale > 0, scale, 1.0)[..., None], 12)
+    flat = np.ascontiguousarray(relative.reshape(-1, relative.shape[-1]))
+    bytes_of_row = flat.view(np.dtype((np.void, flat.dtype.itemsize * flat.shape[1])))[:, 0]
+    _, first, pattern = np.unique(bytes_of_row, return_index=True, return_inverse=True)
+    return RowRules(pattern.reshape(scale.shape), scale, *_rules(phi, flat[first], k))
+
+
+def _rules(phi: Reals, weight: Reals, k: int) -> tuple[Reals, Reals, Reals, Reals]:
+    """Nodes, weights, analysis and synthesis of the measures ``[rules, P]``."""
     fitted = weight > 0
-    low = np.where(fitted, phi, np.inf).min(-1, keepdims=True)
-    high = np.where(fitted, phi, -np.inf).max(-1, keepdims=True)
     empty = ~fitted.any(-1, keepdims=True)
-    centre = np.where(empty, np.pi / 2, (np.where(empty, 0, low) + np.where(empty, 0, high)) / 2)
-    half = np.where(empty | (high <= low), 1.0, np.where(empty, 1.0, high - low) / 2)
+    low = np.where(empty, 0.0, np.where(fitted, phi, np.inf).min(-1, keepdims=True))
+    high = np.where(empty, np.pi, np.where(fitted, phi, -np.inf).max(-1, keepdims=True))
+    centre, half = (low + high) / 2, np.where(high > low, (high - low) / 2, 1.0)
     x = (phi - centre) / half
     mass = weight.sum(-1)
     # three-term recurrence of the orthonormal polynomials (Lanczos, Gautschi 2004, algorithm 2.1)
-    alpha, beta = np.zeros((*mass.shape, k)), np.zeros((*mass.shape, k))
+    alpha, beta = np.zeros((len(mass), k)), np.zeros((len(mass), k))
     before = np.zeros_like(x)
-    p = np.where(fitted, 1 / np.sqrt(np.where(mass > 0, mass, 1.0))[..., None], 0.0)
-    basis = np.empty((*weight.shape, k))
+    p = np.where(fitted, 1 / np.sqrt(np.where(mass > 0, mass, 1.0))[:, None], 0.0)
+    analysis = np.empty((*weight.shape, k))
     for degree in range(k):
         weighted = weight * p
-        basis[..., degree] = weighted
-        alpha[..., degree] = np.einsum("hdp,hdp,hdp->hd", weighted, p, x)
-        q = (x - alpha[..., degree, None]) * p - np.sqrt(beta[..., degree, None]) * before
-        size = np.einsum("hdp,hdp,hdp->hd", weight, q, q)
+        analysis[..., degree] = weighted
+        alpha[:, degree] = (weighted * p * x).sum(-1)
+        q = (x - alpha[:, degree, None]) * p - np.sqrt(beta[:, degree, None]) * before
+        size = (weight * q * q).sum(-1)
         # a row of n cells has n polynomials: what is left of the next one is rounding (1e-13 of a row scaled to [-1, 1])
         live = size > 1e-20
-        before, p = p, np.where(live[..., None], q / np.sqrt(np.where(live, size, 1.0))[..., None], 0.0)
+        before, p = p, np.where(live[:, None], q / np.sqrt(np.where(live, size, 1.0))[:, None], 0.0)
         if degree + 1 < k:
-            beta[..., degree + 1] = np.where(live, size, 0.0)
-    jacobi = np.zeros((*mass.shape, k, k))
+            beta[:, degree + 1] = np.where(live, size, 0.0)
+    jacobi = np.zeros((len(mass), k, k))
     diagonal = np.arange(k)
-    jacobi[..., diagonal, diagonal] = alpha
-    off = np.sqrt(beta[..., 1:])
-    jacobi[..., diagonal[1:], diagonal[:-1]] = off
+    jacobi[:, diagonal, diagonal] = alpha
+    jacobi[:, diagonal[1:], diagonal[:-1]] = np.sqrt(beta[:, 1:])
     nodes, vectors = np.linalg.eigh(jacobi)  # reads the lower triangle
-    first = vectors[..., 0, :]
+    first = vectors[:, 0, :]
     seen = np.abs(first) > 1e-14
-    scale = np.where(seen, first, 1.0) * np.sqrt(np.where(mass > 0, mass, 1.0))[..., None]
-    synthesis = np.where(seen[..., None, :], vectors / scale[..., None, :], 0.0)
-    phi_nodes = np.clip(centre + half * nodes, np.where(empty, 0, low), np.where(empty, np.pi, high))
-    return RowRule(phi_nodes, np.where(seen, mass[..., None] * first**2, 0.0), basis, synthesis)
+    size = np.where(seen, first, 1.0) * np.sqrt(np.where(mass > 0, mass, 1.0))[:, None]
+    synthesis = np.where(seen[:, None, :], vectors / size[:, None, :], 0.0)
+    weights = np.where(seen, mass[:, None] * first**2, 0.0)
+    return np.clip(centre + half * nodes, low, high), weights, analysis, synthesis

@@ -227,7 +227,7 @@ def _search(
     forms: tuple[Chart, ...], blocks: Samples, loss: Loss, proposals: list[Named], fixed: frozenset[str]
 ) -> list[Found]:
     """Best optimum of the whole problem, or of each channel where nothing ties the channels together."""
-    channels = blocks.measured.shape[1]
+    channels = blocks.channels
     apart = loss.separable and not forms[0].shared and channels > 1
     found = []
     for part in [[c] for c in range(channels)] if apart else [list(range(channels))]:

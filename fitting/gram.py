@@ -41,7 +41,7 @@ class Problem(eqx.Module):
     @property
     def channels(self) -> int:
         """Number of channels C."""
-        return self.samples.measured.shape[1]
+        return self.samples.channels
 
     @property
     def own_lobes(self) -> bool:
@@ -253,7 +253,7 @@ def gram(problem: Problem, x: Vector, span: Span) -> Float[Array, "n+1 n+1"]:
     total: Array = _sum_over_blocks(problem.samples, span, one)
     if problem.loss.separable:
         total = _scatter(problem, total)
-    if problem.samples.compressed:
+    if problem.samples.remainder is not None:
         share = jnp.clip(problem.samples.compressed - span.first, 0, span.count) / problem.samples.compressed
         total = total.at[-1, -1].add(share * jnp.sum(problem.samples.remainder))
     return total

@@ -21,7 +21,7 @@ from ..angles import polar_cosines
 from ..geometry import Geometry, from_directions
 from ..polar import PolarStencil
 from ..tables import HalfDifferenceGrid, Table
-from .compression import row_rule
+from .compression import row_rules
 from .losses import Loss
 
 Reals = NDArray[np.float64]
@@ -35,42 +35,67 @@ SCATTERED_CELLS = 8160
 """Samples in a block of scattered samples, at most."""
 
 
-class Samples(eqx.Module):
-    """The fitted cells of a table, and before them a compressed copy where there is one.
-
-    A leaf of ``geometry`` with a leading axis of 1 is shared by all blocks. The first ``compressed`` blocks are the table
-    with its rows along phi_d compressed for one loss; the others are its cells.
-    """
+class Blocks(eqx.Module):
+    """Cells in blocks of one shape. A leaf of ``geometry`` with a leading axis of 1 is shared by all blocks."""
 
     geometry: Geometry
     measured: Float[Array, "blocks C *cells"]
     """BRDF in 1/sr; 0 where not fitted."""
     weight: Float[Array, "blocks *cells"]
     """Share of the measure, 0 where not fitted; sums to 1."""
-    banded: tuple[int, ...] = eqx.field(static=True)
-    """Shape that unfolds ``cells`` so that each angular band of the jackknife has its own index."""
-    band_axes: tuple[int, ...] = eqx.field(static=True)
-    """Axes of ``banded`` that number the bands; the others lie within one."""
-    remainder: Float[Array, "C"]
-    """What the compressed blocks leave out of the cost, a constant."""
-    compressed: int = eqx.field(static=True, default=0)
-    """Number of compressed blocks."""
 
-    @property
-    def blocks(self) -> int:
-        """Number of blocks of cells."""
-        return self.measured.shape[0] - self.compressed
-
-    def block(self, i: Array) -> tuple[Geometry, Float[Array, "C *cells"], Float[Array, "*cells"]]:
+    def at(self, i: Array) -> tuple[Geometry, Float[Array, "C *cells"], Float[Array, "*cells"]]:
         """Geometry, measured values and weights of block i."""
         geometry = jax.tree.map(lambda leaf: leaf[0] if leaf.shape[0] == 1 else leaf[i], self.geometry)
         return geometry, self.measured[i], self.weight[i]
 
+    def channel(self, c: int) -> Blocks:
+        """The same cells with channel c alone."""
+        one: Blocks = eqx.tree_at(lambda b: b.measured, self, self.measured[:, c : c + 1])
+        return one
+
+
+class Samples(eqx.Module):
+    """The fitted cells of a table, and a compressed copy of it for one loss where there is one."""
+
+    cells: Blocks
+    banded: tuple[int, ...] = eqx.field(static=True)
+    """Shape that unfolds the cells of a block so that each angular band of the jackknife has its own index."""
+    band_axes: tuple[int, ...] = eqx.field(static=True)
+    """Axes of ``banded`` that number the bands; the others lie within one."""
+    nodes: Blocks | None = None
+    """The table with its rows along phi_d compressed, in blocks of the same shape."""
+    remainder: Float[Array, "C"] | None = None
+    """What the compressed blocks leave out of the cost, a constant."""
+
+    @property
+    def channels(self) -> int:
+        """Number of channels C."""
+        return self.cells.measured.shape[1]
+
+    @property
+    def blocks(self) -> int:
+        """Number of blocks of cells."""
+        return self.cells.weight.shape[0]
+
+    @property
+    def compressed(self) -> int:
+        """Number of compressed blocks."""
+        return 0 if self.nodes is None else self.nodes.weight.shape[0]
+
+    def block(self, i: Array) -> tuple[Geometry, Float[Array, "C *cells"], Float[Array, "*cells"]]:
+        """Geometry, measured values and weights of block i; compressed blocks are numbered first."""
+        nodes, count = self.nodes, self.compressed
+        if nodes is None:
+            return self.cells.at(i)
+        # the index that is not used is clipped by the lookup, and its block is never read
+        return jax.lax.cond(i < count, lambda: nodes.at(i), lambda: self.cells.at(i - count))
+
     def channel(self, c: int) -> Samples:
         """The same cells with channel c alone."""
-        part = slice(c, c + 1)
-        one: Samples = eqx.tree_at(lambda s: (s.measured, s.remainder), self, (self.measured[:, part], self.remainder[part]))
-        return one
+        nodes = None if self.nodes is None else self.nodes.channel(c)
+        remainder = None if self.remainder is None else self.remainder[c : c + 1]
+        return Samples(self.cells.channel(c), self.banded, self.band_axes, nodes, remainder)
 
 
 def samples(table: Table, max_angle: float, measure: str) -> tuple[Samples, NDArray[np.bool_]]:
@@ -119,6 +144,10 @@ class _Fold:
         self.order = _spread_order(self.steps[0] * self.steps[1])
 
     def __call__(self, a: np.ndarray, fill: float = 0.0) -> Array:
+        """:meth:`fold` for a program."""
+        return jnp.asarray(self.fold(a, fill))
+
+    def fold(self, a: np.ndarray, fill: float = 0.0) -> np.ndarray:
         """Blocks ``[B, ..., H, D' P']`` of ``[..., H, D, P]``; what does not depend on theta_h or (theta_d, phi_d) keeps
         an axis of length 1 there, and what is the same in all blocks has B = 1.
         """
@@ -126,12 +155,12 @@ class _Fold:
         pad = [(0, 0)] * lead + [(0, 0 if n == 1 else m - n) for n, m in zip(a.shape[lead:], self.padded, strict=True)]
         a = np.pad(a, pad, constant_values=fill) if any(after for _, after in pad) else a
         if a.shape[-2:] == (1, 1):
-            return jnp.asarray(a.reshape(1, *a.shape[:-1]))
+            return np.asarray(a.reshape(1, *a.shape[:-1]))
         a = np.broadcast_to(a, (*a.shape[:-2], *self.padded[1:]))
         (step_d, step_p), (_, _, d, p) = self.steps, self.banded
         a = a.reshape(*a.shape[:-2], d, step_d, p, step_p)
         a = np.moveaxis(a, (-3, -1), (0, 1)).reshape(step_d * step_p, *a.shape[:-4], d * p)
-        return jnp.asarray(a[self.order])
+        return np.asarray(a[self.order])
 
     def unfold(self, blocks: np.ndarray) -> np.ndarray:
         """``[H, D, P]`` of blocks ``[B, H, D' P']``."""
@@ -147,70 +176,78 @@ def _grid_samples(table: Table, grid: HalfDifferenceGrid, used: NDArray[np.bool_
     geometry, rows = _grid_geometry(grid.theta_h.tobytes(), grid.theta_d.tobytes(), grid.phi_d.tobytes(), limit)
     part = np.ix_(*rows)
     fold = _Fold((*(len(r) for r in rows), len(grid.phi_d)))
-    measured = np.where(used[part], _block(table.planes, rows), 0.0)
-    none = jnp.zeros(table.channels)
-    return Samples(geometry, fold(measured), fold(weight[part]), banded=fold.banded, band_axes=(0, 2), remainder=none)
+    # channel by channel, so that no copy of the whole table is made on the way
+    planes = (fold.fold(np.where(used[part], plane[part], 0.0)) for plane in table.planes)
+    first = next(planes)
+    measured = np.empty((first.shape[0], table.channels, *first.shape[1:]))
+    for c, plane in enumerate((first, *planes)):
+        measured[:, c] = plane
+    return Samples(Blocks(geometry, jnp.asarray(measured), fold(weight[part])), banded=fold.banded, band_axes=(0, 2))
 
 
-def compress(cells: Samples, table: Table, used: NDArray[np.bool_], max_angle: float, loss: Loss) -> Samples:
-    """The samples with a compressed copy of the table before them, made for one loss (bound to the table).
+CHUNK = 10
+"""Rows of theta_h that are transformed at a time."""
+
+
+def compress(whole: Samples, table: Table, used: NDArray[np.bool_], max_angle: float, loss: Loss) -> Samples:
+    """The samples with a compressed copy of the table beside them, made for one loss (bound to the table).
 
     The same samples where that is not possible: scattered samples, short rows, losses without a transform.
     """
     grid = table.layout
-    if loss.transform is None or not isinstance(grid, HalfDifferenceGrid) or not grid.isotropic:
-        return cells
+    if loss.transform is None or loss.inverse is None or not isinstance(grid, HalfDifferenceGrid) or not grid.isotropic:
+        return whole
     limit = float(np.radians(max_angle))
-    geometry, rows = _grid_geometry(grid.theta_h.tobytes(), grid.theta_d.tobytes(), grid.phi_d.tobytes(), limit)
-    part = np.ix_(*rows)
+    _, rows = _grid_geometry(grid.theta_h.tobytes(), grid.theta_d.tobytes(), grid.phi_d.tobytes(), limit)
     fold = _Fold((*(len(r) for r in rows), len(grid.phi_d)))
     k = fold.banded[3]
     if len(grid.phi_d) < 2 * k:
-        return cells
+        return whole
     h, d = grid.theta_h[rows[0], None, None], grid.theta_d[None, rows[1], None]
-    weight = np.asarray(fold.unfold(np.asarray(cells.weight)))
-    at_cells = _plain_geometry(h, d, grid.phi_d, weight > 0)
-    relative = loss.weight(at_cells)
-    weight = weight if relative is None else weight * np.asarray(relative)
-    rule = row_rule(np.where(grid.phi_d > np.pi, 2 * np.pi - grid.phi_d, grid.phi_d), weight, k)
-    planes = np.where(used[part], _block(table.planes, rows), 0.0)
-    transformed = np.asarray(loss.transform(jnp.asarray(planes), at_cells))
-    coefficients = rule.project(transformed)
-    remainder = (weight * transformed**2).sum((1, 2, 3)) - (coefficients**2).sum((1, 2, 3))
-    at_nodes = _plain_geometry(h, d, rule.phi, rule.weight > 0)
-    assert loss.inverse is not None  # a transform comes with its inverse
-    values = np.asarray(loss.inverse(jnp.asarray(rule.at_nodes(coefficients)), at_nodes))
+    weight = fold.unfold(np.asarray(whole.cells.weight))
+    chunks = [slice(i, i + CHUNK) for i in range(0, len(h), CHUNK)]
+    geometries = [_plain_geometry(h[at], d, grid.phi_d, weight[at] > 0) for at in chunks]
+    for at, g in zip(chunks, geometries, strict=True):
+        relative = loss.weight(g)
+        weight[at] *= 1.0 if relative is None else np.asarray(relative)
+    rules = row_rules(np.where(grid.phi_d > np.pi, 2 * np.pi - grid.phi_d, grid.phi_d), weight, k)
+    reduced = np.empty((table.channels, *rules.phi.shape))
+    remainder = np.zeros(table.channels)
+    for at, g in zip(chunks, geometries, strict=True):
+        part = np.ix_(rows[0][at], rows[1])
+        planes = np.where(used[part], table.planes[:, *part], 0.0)
+        transformed = np.asarray(loss.transform(jnp.asarray(planes), g))
+        reduced[:, at], kept = rules.compress(transformed, at)
+        remainder += np.einsum("hdp,chdp,chdp->c", weight[at], transformed, transformed) - kept
+    node_weight = rules.weight
+    at_nodes = _plain_geometry(h, d, rules.phi, node_weight > 0)
+    values = np.asarray(loss.inverse(jnp.asarray(reduced), at_nodes))
     relative = loss.weight(at_nodes)
-    node_weight = rule.weight if relative is None else rule.weight / np.asarray(relative)
+    node_weight = node_weight if relative is None else node_weight / np.asarray(relative)
     nodes = _Fold((*(len(r) for r in rows), k))
+    blocks = Blocks(_folded(at_nodes, nodes, limit), nodes(values), nodes(node_weight))
+    return Samples(whole.cells, whole.banded, whole.band_axes, blocks, jnp.asarray(np.maximum(remainder, 0.0)))
 
-    def before(first: np.ndarray, leaf: Array, fill: float = 0.0) -> Array:
-        return jnp.concatenate([nodes(first, fill), leaf])
 
-    def stencil(cosine: Array, leaf: PolarStencil | None) -> PolarStencil:
-        assert leaf is not None
+def _folded(g: Geometry, fold: _Fold, limit: float) -> Geometry:
+    """Geometry ``[H, D, P]`` in blocks, with the stencils of its polar angles."""
+
+    def stencil(cosine: Array) -> PolarStencil:
         s = PolarStencil.of(np.asarray(cosine), limit)
-        return PolarStencil(before(np.asarray(s.index), leaf.index, 1), before(np.asarray(s.fraction), leaf.fraction), limit)
+        return PolarStencil(fold(np.asarray(s.index), 1), fold(np.asarray(s.fraction)), limit)
 
-    joined = Geometry(
-        cos_i=before(np.asarray(at_nodes.cos_i), geometry.cos_i, 1.0),
-        cos_o=before(np.asarray(at_nodes.cos_o), geometry.cos_o, 1.0),
-        cos_h=geometry.cos_h,
-        sin2_h=geometry.sin2_h,
-        cos_d=before(np.asarray(at_nodes.cos_d), geometry.cos_d, 1.0),
-        sin2_d=before(np.asarray(at_nodes.sin2_d), geometry.sin2_d),
-        stencil_i=stencil(at_nodes.cos_i, geometry.stencil_i),
-        stencil_o=stencil(at_nodes.cos_o, geometry.stencil_o),
+    cosines = [fold(np.asarray(c), 1.0) for c in (g.cos_i, g.cos_o, g.cos_h, g.cos_d)]
+    sin2_h, sin2_d = (fold(np.asarray(c)) for c in (g.sin2_h, g.sin2_d))
+    return Geometry(
+        cosines[0],
+        cosines[1],
+        cosines[2],
+        sin2_h,
+        cosines[3],
+        sin2_d,
+        stencil_i=stencil(g.cos_i),
+        stencil_o=stencil(g.cos_o),
     )
-    measured, share = before(values, cells.measured), before(node_weight, cells.weight)
-    count = share.shape[0] - cells.weight.shape[0]
-    left = jnp.asarray(np.maximum(remainder, 0.0))
-    return Samples(joined, measured, share, cells.banded, cells.band_axes, left, compressed=count)
-
-
-def _block(planes: Reals, rows: tuple[NDArray[np.int64], NDArray[np.int64]]) -> Reals:
-    """The rows of theta_h and theta_d that are fitted, of ``[C, H, D, P]``."""
-    return planes[:, rows[0]][:, :, rows[1]]
 
 
 def _plain_geometry(h: Reals, d: Reals, phi: Reals, fitted: NDArray[np.bool_]) -> Geometry:
@@ -231,28 +268,10 @@ def _grid_geometry(
     cos_i, cos_o = HalfDifferenceGrid(h, d, p, h, d, p).polar_cosines()
     valid = (cos_i >= np.cos(limit) - 1e-12) & (cos_o >= np.cos(limit) - 1e-12)
     rows = np.flatnonzero(valid.any((1, 2))), np.flatnonzero(valid.any((0, 2)))
-    part = np.ix_(*rows)
     # Guard: cells that are not fitted have weight 0, and 0 * inf = NaN: they get a harmless direction
     # (tests/test_samples.py::test_unused_cells_are_harmless).
-    cos_i, cos_o = (np.where(valid, c, 1.0)[part] for c in (cos_i, cos_o))
-    h, d = h[rows[0], None, None], d[None, rows[1], None]
-    fold = _Fold(cos_i.shape)
-
-    def stencil(cosine: Reals) -> PolarStencil:
-        s = PolarStencil.of(cosine, limit)
-        return PolarStencil(fold(np.asarray(s.index), 1), fold(np.asarray(s.fraction)), limit)
-
-    geometry = Geometry(
-        cos_i=fold(cos_i, 1.0),
-        cos_o=fold(cos_o, 1.0),
-        cos_h=fold(np.cos(h), 1.0),
-        sin2_h=fold(np.sin(h) ** 2),
-        cos_d=fold(np.cos(d), 1.0),
-        sin2_d=fold(np.sin(d) ** 2),
-        stencil_i=stencil(cos_i),
-        stencil_o=stencil(cos_o),
-    )
-    return geometry, rows
+    g = _plain_geometry(h[rows[0], None, None], d[None, rows[1], None], p, valid[np.ix_(*rows)])
+    return _folded(g, _Fold(g.cos_i.shape), limit), rows
 
 
 def _scattered_samples(table: Table, used: NDArray[np.bool_], weight: Reals, limit: float) -> Samples:
@@ -272,8 +291,7 @@ def _scattered_samples(table: Table, used: NDArray[np.bool_], weight: Reals, lim
     g = eqx.tree_at(lambda q: (q.stencil_i, q.stencil_o), g, tuple(stencils), is_leaf=lambda x: x is None)
     measured = np.moveaxis(np.where(fitted, values[:, slots], 0.0), 0, 1)
     kept = jnp.asarray(np.where(fitted, share[slots], 0.0))
-    none = jnp.zeros(table.channels)
-    return Samples(jax.tree.map(jnp.asarray, g), jnp.asarray(measured), kept, banded, (0,), none)
+    return Samples(Blocks(jax.tree.map(jnp.asarray, g), jnp.asarray(measured), kept), banded, (0,))
 
 
 def _band_slots(wi: Reals, wo: Reals) -> NDArray[np.int64]:
