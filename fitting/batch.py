@@ -45,7 +45,8 @@ def fit_many(
 def _results(
     tables: Iterable[Table | StrPath], models: Sequence[Model], workers: int, angles: str, options: dict[str, Any]
 ) -> Iterator[Fit]:
-    with ThreadPoolExecutor(workers) as pool:
+    pool = ThreadPoolExecutor(workers)
+    try:
         for entry in tables:
             try:
                 table = entry if isinstance(entry, Table) else load(entry, angles=angles)  # type: ignore[arg-type]
@@ -66,3 +67,6 @@ def _results(
                 except Exception as fault:
                     reason = f"{type(fault).__name__}: {' '.join(str(fault).split())}"
                     yield failed(table.material, running[done], reason, options)
+    finally:
+        # an interrupted run does not begin what is still waiting
+        pool.shutdown(wait=True, cancel_futures=True)

@@ -79,7 +79,7 @@ def estimate_of(problem: Problem, minimum: Minimum, box: Box) -> Part:
     order = chart.vector(channels)
     return Part(
         channels,
-        {name: np.asarray(v) if per_channel[name] else np.asarray(v)[0] for name, v in values.items()},
+        {name: np.asarray(v) if per_channel[name] else np.asarray(np.asarray(v)[0]) for name, v in values.items()},
         rows,
         jacobian @ u.statistical @ jacobian.T,
         jacobian @ u.jackknife @ jacobian.T,
