@@ -46,6 +46,8 @@ class Chart:
     coordinates: tuple[Coordinate, ...]
     to_parameters: Map
     from_parameters: Map
+    end: Callable[[dict[str, float]], bool] | None = None
+    """Whether shared coordinates lie where the model's next chart takes over; None if there is none."""
 
     @property
     def channel(self) -> tuple[Coordinate, ...]:
@@ -92,6 +94,11 @@ class Chart:
         lower, upper = self.box(channels)
         inside: np.ndarray = np.clip(np.nan_to_num(x, nan=0.0, posinf=1e300, neginf=-1e300), lower, upper)
         return inside
+
+    def continues(self, x: np.ndarray, channels: int) -> bool:
+        """Whether an optimum at x may go on in the next chart."""
+        shared = x[channels * len(self.channel) :]
+        return self.end is not None and self.end({c.name: float(v) for c, v in zip(self.shared, shared, strict=True)})
 
     def box(self, channels: int) -> tuple[np.ndarray, np.ndarray]:
         """Lower and upper bounds of a vector."""
@@ -146,7 +153,12 @@ def _gtr_chart(narrow: bool) -> Chart:
         size = jnp.maximum(jnp.log(p["alpha"]) / sign, 1e-9)
         return {**p, "alpha": jnp.log(size), "gamma": jnp.log(p["gamma"])}
 
-    return _rewritten(plain, to_parameters, from_parameters, alpha=(float(np.log(1e-9)), float(np.log(limit))))
+    def flat(x: dict[str, float]) -> bool:
+        """Whether D is all but constant, K < 0.1: what lies beyond has alpha on the other side of 1."""
+        return x["alpha"] + x["gamma"] < np.log(0.1)
+
+    box = (float(np.log(1e-9)), float(np.log(limit)))
+    return replace(_rewritten(plain, to_parameters, from_parameters, alpha=box), end=flat)
 
 
 def _abc_chart() -> Chart:

@@ -62,6 +62,7 @@ def _columns(function: Callable[[list[Array]], Array], x: list[Array]) -> tuple[
     copies of the value equal.
     """
     columns = []
+    function = jax.jit(function)  # the model is traced once; derivatives are taken of what was traced
     for k in range(len(x)):
 
         def along(t: Array, k: int = k) -> Array:
@@ -231,6 +232,7 @@ class Span(eqx.Module):
 
 def _sum_over_blocks(samples: Samples, span: Span, one: Callable[[Geometry, Array, Array], Any]) -> Any:
     """Sum of ``one(geometry, measured, weight)``, a pytree of arrays, over a span of blocks."""
+    one = jax.jit(one)  # traced once, for its shapes and for the loop
 
     def step(i: Array, total: Any) -> Any:
         return jax.tree.map(jnp.add, total, one(*samples.block(i)))
@@ -241,6 +243,7 @@ def _sum_over_blocks(samples: Samples, span: Span, one: Callable[[Geometry, Arra
     )
 
 
+@eqx.filter_jit  # a solver's program asks for it in several places: it is traced once
 def gram(problem: Problem, x: Vector, span: Span) -> Float[Array, "n+1 n+1"]:
     """G = [J r]^T [J r] over a span of blocks; its last element is the cost, with what compression left out."""
     tables = polar_tables(problem, x)

@@ -2,7 +2,9 @@
 
 from __future__ import annotations
 
+from collections.abc import Iterator
 from dataclasses import dataclass
+from typing import NamedTuple
 
 import equinox as eqx
 import jax.numpy as jnp
@@ -19,7 +21,7 @@ COLOUR_BLOCKS = (2, 1)
 COARSE_BLOCKS = (6, 3)
 """Blocks of cells, and compressed blocks, for polishing the best shapes."""
 POLISHED = 7
-"""Starts that are polished on the coarse table, besides the best one of each further chart."""
+"""Starts that are polished on the coarse table, of each chart."""
 FINISHED = 3
 """Distinct optima of the coarse table that are carried to the whole one, at most."""
 SAME = 1e-3
@@ -63,68 +65,77 @@ class Found:
     """Whether the minimum is one of the cells themselves, not of the compressed table."""
 
 
-def _varied(ranked: list[tuple[float, Problem, Box, Minimum]]) -> list[tuple[float, Problem, Box, Minimum]]:
-    """The best starts, without those that are a better one's double, and the best of every chart."""
-    kept: list[tuple[float, Problem, Box, Minimum]] = []
-    for r in ranked:
-        double = kept and r[1] is kept[-1][1] and r[0] <= kept[-1][0] * (1 + 1e-9)
-        new_chart = all(r[1] is not k[1] for k in kept)
-        if not double and (len(kept) < POLISHED or new_chart):
-            kept.append(r)
-    return kept
+class Candidate(NamedTuple):
+    """A minimum of some problem, and its cost (infinite where there is none)."""
 
-
-def _finite(cost: float) -> float:
-    return cost if np.isfinite(cost) and cost < 1e290 else np.inf
+    cost: float
+    problem: Problem
+    box: Box
+    minimum: Minimum
 
 
 def search(problems: list[tuple[Problem, Box, list[NDArray[np.float64]]]]) -> Found:
     """Best optimum over problems that differ in their chart only, each with a box and starts in its coordinates.
 
     Every start gets its linear coordinates refitted on a coarse table; the best shapes are then polished there, all
-    coordinates free, and the distinct optima among them on the whole table.
+    coordinates free, and the distinct optima among them on the whole table. A further chart is searched only if the best
+    optimum so far lies where it takes over.
     """
     samples = problems[0][0].samples
     fast = samples.compressed > 0
     part = Span.nodes if fast else Span.cells
-    colour = Stage.of(part(samples, COLOUR_BLOCKS[fast]), 1e-2, 1e-2)
-    coarse = Stage.of(part(samples, COARSE_BLOCKS[fast]), 1e-6, 1.0)
+    coarse = (
+        Stage.of(part(samples, COLOUR_BLOCKS[fast]), 1e-2, 1e-2),
+        Stage.of(part(samples, COARSE_BLOCKS[fast]), 1e-6, 1.0),
+    )
     whole = Stage.of(part(samples), 1e-9, 1e-6)
-    ranked: list[tuple[float, Problem, Box, Minimum]] = []
+    polished: list[Candidate] = []
+    tried = 0
     for problem, box, starts in problems:
-        linear = jnp.asarray([c.linear for c, _ in problem.chart.vector(problem.channels)])
-        colours = Box(box.lower, box.upper, box.free & linear)
-        for x in starts:
-            m = solve(problem, jnp.asarray(x), colours, colour)
-            ranked.append((_finite(float(m.cost)), problem, box, m))
-    ranked.sort(key=lambda r: r[0])
-    polished = []
-    for _, problem, box, m in _varied(ranked):
-        m = solve(problem, m.x, box, coarse)
-        polished.append((_finite(float(m.cost)), problem, box, m))
-    polished.sort(key=lambda p: p[0])
-    distinct: list[tuple[float, Problem, Box, Minimum]] = []
+        tried += len(starts)
+        polished = sorted([*polished, *_polished(problem, box, starts, *coarse)], key=_cost)
+        best = polished[0]
+        if not best.problem.chart.continues(np.asarray(best.minimum.x), problem.channels):
+            break
+    distinct: list[Candidate] = []
     counts: list[int] = []
     for candidate in polished:
-        cost = candidate[0]
-        if distinct and cost <= distinct[-1][0] * (1 + SAME):
+        if distinct and candidate.cost <= distinct[-1].cost * (1 + SAME):
             counts[-1] += 1
         else:
             distinct.append(candidate)
             counts.append(1)
-    finished: list[tuple[float, int, Problem, Box, Minimum]] = []
-    passes = 0
-    for (cost, problem, box, m), count in zip(distinct[:FINISHED], counts, strict=False):
-        if finished and not cost <= WORTH * distinct[0][0]:
-            continue
-        end = solve(problem, m.x, box, whole)
-        passes += 0 if fast else int(end.steps)
-        finished.append((_finite(float(end.cost)), count, problem, box, end))
-    finished.sort(key=lambda f: f[0])
-    optima = [Optimum(float(np.sqrt(cost)), count) for cost, count, *_ in finished]
-    optima += [Optimum(float(np.sqrt(d[0])), n) for d, n in list(zip(distinct, counts, strict=True))[len(finished) :]]
-    _, _, problem, box, best = finished[0]
-    return Found(problem, box, best, sum(len(s) for _, _, s in problems), _merged(optima), passes, not fast)
+    worth = [d for d in distinct[:FINISHED] if d.cost <= WORTH * distinct[0].cost] or distinct[:1]
+    finished = [_candidate(d.problem, d.box, solve(d.problem, d.minimum.x, d.box, whole)) for d in worth]
+    costs = [c.cost for c in (*finished, *distinct[len(finished) :])]
+    optima = [Optimum(float(np.sqrt(cost)), count) for cost, count in zip(costs, counts, strict=True)]
+    best = min(finished, key=_cost)
+    passes = 0 if fast else sum(int(c.minimum.steps) for c in finished)
+    return Found(best.problem, best.box, best.minimum, tried, _merged(optima), passes, not fast)
+
+
+def _polished(
+    problem: Problem, box: Box, starts: list[NDArray[np.float64]], colour: Stage, coarse: Stage
+) -> Iterator[Candidate]:
+    """The best starts after a refit of the linear coordinates, polished; of doubles only one."""
+    linear = jnp.asarray([c.linear for c, _ in problem.chart.vector(problem.channels)])
+    colours = Box(box.lower, box.upper, box.free & linear)
+    ranked = sorted((_candidate(problem, box, solve(problem, jnp.asarray(x), colours, colour)) for x in starts), key=_cost)
+    kept: list[Candidate] = []
+    for c in ranked:
+        if len(kept) < POLISHED and not (kept and c.cost <= kept[-1].cost * (1 + 1e-9)):
+            kept.append(c)
+    for c in kept or ranked[:1]:
+        yield _candidate(problem, box, solve(problem, c.minimum.x, box, coarse))
+
+
+def _candidate(problem: Problem, box: Box, minimum: Minimum) -> Candidate:
+    cost = float(minimum.cost)
+    return Candidate(cost if np.isfinite(cost) and cost < 1e290 else np.inf, problem, box, minimum)
+
+
+def _cost(candidate: Candidate) -> float:
+    return candidate.cost
 
 
 def _merged(optima: list[Optimum]) -> tuple[Optimum, ...]:

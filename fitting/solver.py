@@ -11,6 +11,7 @@ from collections.abc import Callable
 from typing import Any
 
 import equinox as eqx
+import jax
 import jax.numpy as jnp
 import optimistix as optx
 from jaxtyping import Array, Bool, Float
@@ -88,30 +89,34 @@ class BoxDescent(optx.AbstractDescent[Any, Any, Any]):
         diagonal = jnp.diag(state.matrix)
         # Guard: a parameter without any effect has a zero column; it gets scale 1 and stays where it is.
         scale = jnp.sqrt(jnp.where(diagonal > 0, diagonal, 1.0))
-        damping = jnp.maximum(self.damping / step_size, 1e-14)
+        damping = jnp.maximum(self.damping / step_size, 1e-13)
         gradient = state.gradient / scale
         gauss_newton = state.matrix / scale[:, None] / scale
         hessian = gauss_newton + state.second / scale[:, None] / scale
         lower, upper = (self.box.lower - state.y) * scale, (self.box.upper - state.y) * scale
-        d = self._boxed(gauss_newton, gradient, damping, lower, upper)
-        newton = self._boxed(hessian, gradient, damping, lower, upper)
+        boxed = jax.vmap(lambda matrix: self._boxed(matrix, gradient, damping, lower, upper))
+        d, newton = boxed(jnp.stack([gauss_newton, hessian]))
         convex = (newton @ hessian @ newton > 0) & (gradient @ newton < 0)
         d = jnp.where(state.augmented & convex, newton, d)
         y = jnp.clip(state.y + d / scale, self.box.lower, self.box.upper)  # lands on the bound itself, to the bit
         return jnp.where(self.box.free, y - state.y, 0.0), optx.RESULTS.successful
 
     def _boxed(self, matrix: Array, gradient: Vector, damping: Array, lower: Vector, upper: Vector) -> Vector:
-        """Minimiser of the damped quadratic in a box, by a few rounds of an active set."""
+        """Minimiser of the damped quadratic in a box, by a few rounds of an active set; NaN where it is not convex."""
         outward = ((lower >= 0) & (gradient > 0)) | ((upper <= 0) & (gradient < 0))
         held = ~self.box.free | outward
-        at = jnp.zeros_like(gradient)
-        for _ in range(3):
+
+        def one_round(_: int, carry: tuple[Array, Array, Array]) -> tuple[Array, Array, Array]:
+            held, at, _ = carry
             moving = ~held
             a = jnp.where(moving[:, None] & moving, matrix, 0.0) + jnp.diag(jnp.where(moving, damping, 1.0))
-            d = jnp.linalg.solve(a, jnp.where(moving, -(gradient + matrix @ jnp.where(held, at, 0.0)), at))
+            rhs = jnp.where(moving, -(gradient + matrix @ jnp.where(held, at, 0.0)), at)
+            d = jax.scipy.linalg.cho_solve((jnp.linalg.cholesky(a), True), rhs)
             clipped = jnp.clip(d, lower, upper)
-            at = jnp.where(moving & (clipped != d), clipped, at)
-            held = held | (clipped != d)
+            return held | (clipped != d), jnp.where(moving & (clipped != d), clipped, at), d
+
+        nothing = jnp.zeros_like(gradient)
+        _, _, d = jax.lax.fori_loop(0, 3, one_round, (held, nothing, nothing))
         return jnp.where(self.box.free, jnp.clip(d, lower, upper), 0.0)
 
 
