@@ -202,6 +202,26 @@ def models_command(as_json: bool) -> int:
     return OK
 
 
+@commands.command("stability")
+@click.option("--out", "out_dir", required=True, metavar="DIR", help="Where stability.md, .html and .json go.")
+@click.option("--draws", type=click.IntRange(1), help="Random draws of each part that must be finite.  [default: some]")
+@click.option("--quiet", is_flag=True, help="Print nothing.")
+def stability_command(out_dir: str, draws: int | None, quiet: bool) -> int:
+    """Measure how many digits every model and part keeps over its whole domain; takes three minutes."""
+    try:
+        import mpmath  # noqa: F401
+    except ImportError:
+        raise InputError("stability needs mpmath for its 40-digit reference: pip install 'brdfit[stability]'") from None
+    _keep_programs()
+    out = _writable(out_dir)
+    from .stability.page import write_atlas
+
+    page = write_atlas(out, draws, (lambda text: None) if quiet else (lambda text: click.echo(text, err=True)))
+    if not quiet:
+        click.echo(f"atlas: {page}")
+    return OK
+
+
 def _checked_names(models: str, loss: str) -> list[str]:
     """The models of a list with commas, once each. Raises UsageError for an unknown name of a model or loss."""
     from .fitting.losses import LOSSES

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import abc
 import math
+from collections.abc import Callable
 from dataclasses import dataclass, fields, replace
 from typing import Any, ClassVar
 
@@ -14,6 +15,7 @@ import numpy as np
 from jaxtyping import Array, ArrayLike, Float
 
 from ..geometry import Geometry, from_directions
+from ..special import hold_slopes
 
 
 @dataclass(frozen=True)
@@ -115,8 +117,10 @@ class BRDF(eqx.Module):
         # Guard the input: below the horizon models divide by zero or take roots of negative numbers, and 0 * inf = NaN
         # in the gradient (tests/test_models.py::test_below_the_horizon).
         normal = jnp.zeros(3, wi.dtype).at[2].set(1)
-        g = from_directions(jnp.where(above[..., None], wi, normal), jnp.where(above[..., None], wo, normal))
-        return jnp.where(above[..., None], evaluate_channels(self, g), 0)
+        wi, wo = (jnp.where(above[..., None], w, normal) for w in (wi, wo))
+        single = jnp.result_type(wi, *jax.tree.leaves(self)) == jnp.float32
+        values = _single_precision(self, wi, wo) if single else evaluate_channels(self, from_directions(wi, wo))
+        return jnp.where(above[..., None], values, 0)
 
 
 def channel_axes(model: BRDF, channel: Any = 0, shared: Any = None) -> BRDF:
@@ -144,7 +148,28 @@ def evaluate_channels(model: BRDF, g: Geometry, out_axis: int = -1) -> Float[Arr
     def one(m: BRDF) -> Array:
         return jnp.broadcast_to(m.evaluate(g), shape)
 
-    return jax.vmap(one, in_axes=(channel_axes(model),), out_axes=out_axis, axis_size=channels(model))(model)
+    return _over_channels(one, model, out_axis)
+
+
+def _single_precision(model: BRDF, wi: Float[Array, "... 3"], wo: Float[Array, "... 3"]) -> Float[Array, "... C"]:
+    """As :func:`evaluate_channels`, with derivatives that stay finite where float32 cannot hold them."""
+    directions = [w[..., k] for w in (wi, wo) for k in range(3)]
+
+    def one(m: BRDF) -> Array:
+        leaves, kind = jax.tree.flatten(m)
+
+        def value(*x: Array) -> Array:
+            g = from_directions(jnp.stack(x[-6:-3], -1), jnp.stack(x[-3:], -1))
+            return jnp.broadcast_to(kind.unflatten(x[:-6]).evaluate(g), g.shape)
+
+        return hold_slopes(value, *leaves, *directions)
+
+    return _over_channels(one, model, -1)
+
+
+def _over_channels(one: Callable[[BRDF], Array], model: BRDF, out_axis: int) -> Array:
+    axes = (channel_axes(model),)
+    return jax.vmap(one, in_axes=axes, out_axes=out_axis, axis_size=channels(model))(model)
 
 
 __all__ = [

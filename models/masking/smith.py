@@ -11,7 +11,7 @@ from jaxtyping import Array, Float
 from ...geometry import Geometry
 from ...quadrature import smith_kernel
 
-NODES = 140
+NODES = 170
 REACH = 28.0
 """Range of u of the quadrature: ln(2 tan(theta)) is 10 at 89.995 degrees, and u - 10 = 18 holds densities that change
 within e^-10 of the horizon. A density that needs less says so as ``smith_reach``, which sets the nodes closer."""

@@ -29,5 +29,7 @@ class GTR(eqx.Module):
         narrow = log_alpha2 <= 0
         m = jnp.where(narrow, -log_alpha2, log_alpha2)  # not abs: its derivative at alpha = 1 would be 0
         u = jnp.where(narrow, sin2, cos2)
-        k = expm1_ratio(m) / (jnp.pi * expm1_ratio((1 - self.gamma) * m))
+        # Guard: a reciprocal, because the derivative of a quotient a/b forms a db, 1e43 here, beyond float32
+        # (tests/test_stability.py::test_random_draws_are_finite).
+        k = expm1_ratio(m) * (1 / (jnp.pi * expm1_ratio((1 - self.gamma) * m)))
         return k * jnp.exp(-self.gamma * jnp.log1p(jnp.expm1(m) * u))

@@ -1,0 +1,140 @@
+"""The atlas as files: Markdown with pictures, one self-contained HTML page, and JSON with all numbers."""
+
+from __future__ import annotations
+
+import base64
+import io
+import json
+from collections.abc import Callable, Sequence
+from dataclasses import asdict
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+from ..environment import environment
+from ..files import StrPath, replacing
+from .atlas import Map, Record, survey
+from .measure import LARGEST_SLOPE, SMALLEST_SINGLE
+
+TITLES = {
+    "models": "Models",
+    "ndf": "Normal distributions",
+    "masking": "Masking",
+    "fresnel": "Fresnel reflectance",
+    "special": "Special functions",
+}
+DIGITS = {"float64": 16, "float32": 8}
+
+
+def write_atlas(out_dir: StrPath, draws: int | None = None, say: Callable[[str], None] = lambda text: None) -> Path:
+    """Measure everything and write DIR/stability.md with its pictures, DIR/stability.html and DIR/stability.json."""
+    from jinja2 import Environment, FileSystemLoader, StrictUndefined
+
+    records, where = survey(draws, say), environment()
+    out = Path(out_dir)
+    groups = []
+    for key, title in TITLES.items():
+        members = [r for r in records if r.group == key]
+        picture = _picture(members)
+        _write(out / "stability" / f"{key}.png", picture)
+        embedded = f"data:image/png;base64,{base64.b64encode(picture).decode()}"
+        groups.append({"key": key, "title": title, "rows": [_row(r) for r in members], "embedded": embedded})
+    templates = Environment(
+        loader=FileSystemLoader(Path(__file__).parent), undefined=StrictUndefined, trim_blocks=True, lstrip_blocks=True
+    )
+    context = {
+        "groups": groups,
+        "where": where,
+        "draws": draws,
+        "finite": all(r.values_not_finite == r.slopes_not_finite == 0 for r in records),
+        "slope_end": f"{LARGEST_SLOPE:.0e}",
+        "single_floor": f"{SMALLEST_SINGLE[0]:.0e}",
+    }
+    for name in ("stability.md", "stability.html"):
+        _write(out / name, templates.get_template(f"{name}.j2").render(context).encode())
+    document = {
+        "format": "brdfit-stability",
+        "version": 1,
+        "environment": where,
+        "records": [_plain(asdict(r)) for r in records],
+    }
+    _write(out / "stability.json", (json.dumps(document, indent=1, allow_nan=False) + "\n").encode())
+    return out / "stability.html"
+
+
+def _row(r: Record) -> dict[str, Any]:
+    at = ", ".join(f"{k} {v:.6g}" for k, v in r.value.at.items() if not k.startswith(("wi_", "wo_")))
+    slope = ", ".join(f"{k} {v:.6g}" for k, v in r.slope.at.items() if not k.startswith(("wi_", "wo_")))
+    return {
+        "name": r.name,
+        "precision": r.precision,
+        "value": f"{r.value.error:.1e}",
+        "at": at or "directions only",
+        "slope": f"{r.slope.error:.1e}",
+        "by": r.slope.argument,
+        "slope_at": slope or "directions only",
+        "points": r.points,
+        "draws": r.draws,
+        "bad": f"{r.values_not_finite} / {r.slopes_not_finite}",
+    }
+
+
+def _plain(x: Any) -> Any:
+    if isinstance(x, np.ndarray):
+        return [float(f"{v:.6g}") for v in x] if x.ndim == 1 else [_plain(row) for row in x]
+    if isinstance(x, dict):
+        return {k: _plain(v) for k, v in x.items()}
+    return [_plain(v) for v in x] if isinstance(x, tuple | list) else x
+
+
+def _picture(records: Sequence[Record]) -> bytes:
+    """Digits kept, a row for each part and varied argument, a column for each of value and slope in either precision."""
+    from matplotlib import rc_context
+    from matplotlib.backends.backend_agg import FigureCanvasAgg
+    from matplotlib.figure import Figure
+
+    pairs = [(r, m) for r in records for m in r.maps if r.precision == "float64"]
+    single = {(r.name, m.varied): m for r in records for m in r.maps if r.precision == "float32"}
+    with rc_context({"font.size": 6, "axes.linewidth": 0.4, "xtick.major.width": 0.3, "ytick.major.width": 0.3}):
+        figure = Figure(figsize=(8.2, 0.35 + 1.15 * len(pairs)), layout="constrained")
+        FigureCanvasAgg(figure)
+        axes = figure.subplots(len(pairs), 4, squeeze=False, sharex=False, sharey=False)
+        for line, (record, m) in zip(axes, pairs, strict=True):
+            other = single[record.name, m.varied]
+            panels = ((m.value, "float64"), (m.slope, "float64"), (other.value, "float32"), (other.slope, "float32"))
+            for k, (ax, (error, precision)) in enumerate(zip(line, panels, strict=True)):
+                digits = np.clip(-np.log10(np.maximum(error, 1e-18)), 0, DIGITS[precision])
+                shown = ax.imshow(digits, cmap="viridis", vmin=0, vmax=DIGITS[precision], aspect="auto")
+                _label(ax, record, m, first=k == 0)
+                if line is axes[0]:
+                    ax.set_title(f"{('value', 'slope')[k % 2]}, {precision}: digits")
+                if k % 2:
+                    figure.colorbar(shown, ax=ax, pad=0.02, aspect=12)
+        out = io.BytesIO()
+        figure.savefig(out, format="png", dpi=100, metadata={"Software": None}, pil_kwargs={"optimize": True})
+    return out.getvalue()
+
+
+def _label(ax: Any, record: Record, m: Map, first: bool) -> None:
+    in_degrees = record.angle not in ("p", "any")
+    columns = np.degrees(m.columns) if in_degrees else m.columns
+    places = range(0, len(columns), max(1, len(columns) // 4))
+    ax.set_xticks(list(places), [f"{columns[k]:.5g}" for k in places])
+    if record.angle == "any":
+        ax.set_xticks([])
+    else:
+        ax.set_xlabel(record.angle + (", degrees" if in_degrees else ""), labelpad=1)
+    rows = range(0, len(m.rows), max(1, len(m.rows) // 3))
+    ax.set_yticks(list(rows), [f"{m.rows[k]:.2g}" for k in rows] if first else [])
+    if first:
+        ax.set_ylabel(f"{record.name}\n{m.varied}", fontsize=6)
+
+
+def _write(path: Path, content: bytes) -> None:
+    path.parent.mkdir(parents=True, exist_ok=True)
+    with replacing(path) as temporary:
+        temporary.write_bytes(content)
+
+
+__all__ = ["write_atlas"]
