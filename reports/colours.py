@@ -6,7 +6,8 @@ taken as linear sRGB. Any other number is shown as grey, the mean of the channel
 
 from __future__ import annotations
 
-from typing import TYPE_CHECKING
+from functools import cache
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 from numpy.typing import NDArray
@@ -49,20 +50,25 @@ def screen(values: Reals, exposure: float) -> Reals:
     return np.repeat(np.clip(values.mean(-1, keepdims=True) * exposure, 0, 1), 3, -1)
 
 
+@cache
+def library() -> Any:
+    """The colour library, imported on first use. Importing it sets NumPy's print options, which here stay as they were."""
+    with np.printoptions():
+        import colour
+    return colour
+
+
 def encode(linear: Reals) -> Reals:
     """sRGB code values of linear ones."""
-    import colour
-
-    return np.asarray(colour.cctf_encoding(linear, "sRGB"))
+    return np.asarray(library().cctf_encoding(linear, "sRGB"))
 
 
 def delta_e(a: Reals, b: Reals) -> Reals:
     """CIEDE2000 colour difference of linear sRGB ``[n, 3]``; NaN where either is."""
-    import colour
-
     known = np.isfinite(a).all(-1) & np.isfinite(b).all(-1)
     out = np.full(a.shape[0], np.nan)
     if known.any():
+        colour = library()
         lab = [colour.XYZ_to_Lab(colour.RGB_to_XYZ(x[known], "sRGB")) for x in (a, b)]
         out[known] = colour.delta_E(lab[0], lab[1], method="CIE 2000")
     return out

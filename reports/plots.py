@@ -5,7 +5,8 @@ from __future__ import annotations
 import base64
 import io
 import re
-from collections.abc import Sequence
+from collections.abc import Iterator, Sequence
+from contextlib import contextmanager
 from typing import Any
 
 import numpy as np
@@ -51,6 +52,22 @@ _STYLE: dict[Any, Any] = {
 }
 
 
+_PRINTING: dict[str, Any] = {
+    "precision": 8,
+    "threshold": 1000,
+    "edgeitems": 3,
+    "linewidth": 75,
+    "suppress": False,
+    "nanstr": "nan",
+    "infstr": "inf",
+    "sign": "-",
+    "formatter": None,
+    "floatmode": "maxprec",
+    "legacy": False,
+}
+"""NumPy's own defaults."""
+
+
 def styles(names: Sequence[str]) -> dict[str, dict[str, Any]]:
     """Colour, dash and marker for each label; those of the five models are always the same."""
     known = list(PALETTE)
@@ -80,10 +97,14 @@ def _figure(
     return figure, figure.subplots(rows, columns, squeeze=False, **options)
 
 
-def _styled(salt: str) -> Any:
+@contextmanager
+def _styled(salt: str = "", grid: bool = True) -> Iterator[None]:
+    """The style of all figures. The ids in an SVG are hashes of printed numbers, so it settles how numbers print, too."""
     import matplotlib
 
-    return matplotlib.rc_context({**_STYLE, "svg.hashsalt": salt})
+    style: dict[Any, Any] = {**_STYLE, "svg.hashsalt": salt, "axes.grid": grid}
+    with matplotlib.rc_context(style), np.printoptions(**_PRINTING):
+        yield
 
 
 def _svg(figure: Any, alt: str) -> str:
@@ -194,7 +215,6 @@ def _window(x: NDArray[Any], y: NDArray[Any], angle: float) -> tuple[float, floa
 
 def maps(part: Maps, fits: Sequence[tuple[int, str]]) -> str:
     """Signed and RMS residual of each fit over (theta_h, theta_d), as the data URI of a PNG."""
-    import matplotlib
     from matplotlib import colormaps
 
     rows = [m for m, _ in fits]
@@ -202,7 +222,7 @@ def maps(part: Maps, fits: Sequence[tuple[int, str]]) -> str:
     limit = float(np.percentile(np.abs(part.signed[rows][known]), 98)) if known.any() else 1.0
     top = float(np.percentile(part.rms[rows][known], 98)) if known.any() else 1.0
     limit, top = max(limit, 1e-6), max(top, 1e-6)
-    with matplotlib.rc_context({**_STYLE, "axes.grid": False}):
+    with _styled(grid=False):
         columns = len(rows)
         width = 1.72 * columns + 1.5
         figure, axes = _figure(width, 4.0, (0.55, 0.95, 0.45, 0.3), 2, columns, sharex=True, sharey=True)
