@@ -4,17 +4,17 @@ from __future__ import annotations
 
 import math
 import re
-from collections.abc import Iterable, Sequence
+from collections.abc import Sequence
 from pathlib import PurePath
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
 from .. import references
-from . import materials, physics, plots, words
-from .colours import encode
+from . import physics, plots, words
 from .evidence import Evidence
 from .gather import fit_key
+from .model_section import anchor, model_view, physics_view
 from .words import significant
 
 if TYPE_CHECKING:
@@ -47,13 +47,14 @@ def page(fits: Sequence[Fit], evidence: Sequence[Evidence], environment: dict[st
     groups: dict[tuple[str, str, str], list[Fit]] = {}
     for f in fits:
         groups.setdefault((f.material, f.source, f.sha256), []).append(f)
-    sections = [_section(k, group, by_source.get(key)) for k, (key, group) in enumerate(groups.items())]
+    titles = _titles(list(groups))
+    sections = [_section(k, titles[k], group, by_source.get(key)) for k, (key, group) in enumerate(groups.items())]
     failed = sum(not f.converged for f in fits)
     summary = f"{words.count(len(fits), 'fit')} of {words.count(len(groups), 'material')}"
     if failed:
         summary += f"; {words.count(failed, 'fit')} failed or did not converge"
     return {
-        "title": sections[0]["material"] if len(sections) == 1 else words.count(len(sections), "material"),
+        "title": titles[0] if len(sections) == 1 else words.count(len(sections), "material"),
         "summary": summary[:1].upper() + summary[1:] + ".",
         "sections": sections,
         "overview": _overview(sections) if len(sections) > 1 else None,
@@ -84,7 +85,22 @@ def labels(fits: Sequence[Fit]) -> list[str]:
     return [n if names.count(n) == 1 else f"{n} #{names[:k].count(n) + 1}" for k, n in enumerate(names)]
 
 
-def _section(number: int, fits: list[Fit], evidence: Evidence | None) -> View:
+def _titles(tables: Sequence[tuple[str, str, str]]) -> list[str]:
+    """A name for each table (material, source, SHA-256): its material, and the end of its path where others share that."""
+    out = []
+    for material, source, digest in tables:
+        others = [(PurePath(s).parts, d) for m, s, d in tables if m == material and (s, d) != (source, digest)]
+        parts = PurePath(source).parts
+        # as many folders as it takes; the digest where the paths are the same
+        k = next((k for k in range(1, len(parts) + 1) if all(p[-k:] != parts[-k:] for p, _ in others)), len(parts))
+        where = "/".join(parts[-k:]) if parts else ""
+        if any(p == parts for p, _ in others):
+            where = ", ".join(w for w in (where, digest[:6]) if w)
+        out.append(f"{material} ({where})" if others and where else material)
+    return out
+
+
+def _section(number: int, title: str, fits: list[Fit], evidence: Evidence | None) -> View:
     first = fits[0]
     names = labels(fits)
     order = sorted(range(len(fits)), key=lambda k: (not math.isfinite(perceptual(fits[k])), perceptual(fits[k]), k))
@@ -95,10 +111,10 @@ def _section(number: int, fits: list[Fit], evidence: Evidence | None) -> View:
     salt = f"brdfit-{number}-"
     return {
         "number": number,
-        "material": first.material,
+        "material": title,
         "anchor": f"m{number}-" + (re.sub(r"[^A-Za-z0-9]+", "-", first.material).strip("-").lower() or "table"),
         "about": _about(fits),
-        "headline": _headline(ranked),
+        "headline": _headline(title, ranked),
         "ranking": [_rank(k + 1, f, label) for k, (f, label) in enumerate(ranked)],
         "tradeoff": _tradeoff(ranked, salt),
         "spheres": _spheres(evidence, drawn, first.material),
@@ -107,8 +123,8 @@ def _section(number: int, fits: list[Fit], evidence: Evidence | None) -> View:
         "maps": _maps(evidence, drawn, first.material),
         "albedo": _albedo(evidence, drawn, first, salt),
         "losses": _losses(*zip(*ranked, strict=True)),
-        "physics": [_physics(f, label, evidence, rows) for f, label in ranked if f.parameters],
-        "models": [_model(f, label, channel_names, salt) for f, label in ranked],
+        "physics": [physics_view(f, label, evidence, rows) for f, label in ranked if f.parameters],
+        "models": [model_view(f, label, channel_names) for f, label in ranked],
         "missing": _missing(evidence, [n for f, n in ranked if f.parameters and not _shows(f, rows)]),
         "overview": {label: (perceptual(f), f.converged) for f, label in zip(fits, names, strict=True)},
     }
@@ -146,8 +162,7 @@ def _about(fits: Sequence[Fit]) -> str:
     return text + (f", {words.thousands(beyond)} measured but beyond {f.max_angle:g}°." if beyond > 0 else ".")
 
 
-def _headline(ranked: Sequence[tuple[Fit, str]]) -> str:
-    material = ranked[0][0].material
+def _headline(material: str, ranked: Sequence[tuple[Fit, str]]) -> str:
     good = [(f, label) for f, label in ranked if math.isfinite(perceptual(f))]
     if not good:
         return f"No model could be fitted to {material}."
@@ -176,7 +191,6 @@ def _headline(ranked: Sequence[tuple[Fit, str]]) -> str:
 
 def _rank(rank: int, f: Fit, label: str) -> View:
     error = perceptual(f)
-    solve, passes = f.seconds.get("solve", math.nan), f.passes
     return {
         "rank": str(rank) if math.isfinite(error) else words.NONE,
         "label": label,
@@ -184,17 +198,13 @@ def _rank(rank: int, f: Fit, label: str) -> View:
         "grade": words.grade_index(error),
         "words": words.grade(error) if math.isfinite(error) else f"failed: {f.reason}",
         "numbers": sum(v.size for n, v in f.parameters.items() if n not in f.fixed) or words.NONE,
-        "solve": words.seconds(solve),
-        "pass": words.seconds(solve / passes) if passes else words.NONE,
-        "passes": passes or words.NONE,
+        "solve": words.seconds(f.seconds.get("solve", math.nan)),
+        "search": f.path if f.passes else words.NONE,
+        "passes": f.passes or words.NONE,
         "compile": words.seconds(f.seconds.get("compile", math.nan)),
         "converged": f.converged,
-        "anchor": _anchor(f, label),
+        "anchor": anchor(f, label),
     }
-
-
-def _anchor(f: Fit, label: str) -> str:
-    return re.sub(r"[^A-Za-z0-9]+", "-", f"{f.source}-{f.sha256[:6]}-{label}").strip("-").lower()
 
 
 def _tradeoff(ranked: Sequence[tuple[Fit, str]], salt: str) -> str | None:
@@ -310,221 +320,6 @@ def _losses(fits: Sequence[Fit], names: Sequence[str]) -> View:
             {"name": name, "about": LOSSES.get(name, ""), "cells": cells, "fitted": any(f.loss == name for f in fits)}
         )
     return {"names": list(names), "rows": table}
-
-
-def _physics(f: Fit, label: str, evidence: Evidence | None, rows: dict[str, int]) -> View:
-    f0 = physics.normal_reflectance(f.model_name, f.parameters)
-    width = physics.lobe_width(f.model_name, f.parameters)
-    view: View = {"label": label, "f0": None, "width": None, "energy": "not computed", "energy_warn": False}
-    if f0 is not None:
-        view["f0"] = {
-            "value": words.triple(f0.value),
-            "expression": f0.expression,
-            "remark": f0.remark,
-            "kind": materials.kind_of(f0.value),
-            "warn": bool(materials.GAP[0] < float(np.mean(f0.value)) < materials.GAP[1] or np.mean(f0.value) > 1),
-            "nearest": None,
-        }
-        if f0.value.shape == (3,) and np.isfinite(f0.value).all():
-            substance, distance = materials.nearest(f0.value)
-            view["f0"]["nearest"] = substance.name
-            view["f0"]["nearest_value"] = " ".join(f"{v:.3g}" for v in substance.f0)
-            view["f0"]["distance"] = significant(distance, 2)
-            view["f0"]["far"] = distance > 0.15
-            view["f0"]["swatch"], view["f0"]["nearest_swatch"] = _hex(f0.value), _hex(np.array(substance.f0))
-    if width is not None:
-        view["width"] = {
-            "half": significant(math.degrees(width.half_width), 3),
-            "alpha": significant(width.alpha, 3),
-            "roughness": significant(width.roughness, 3),
-            "exponent": significant(width.exponent, 3),
-        }
-    if evidence and evidence.albedo and fit_key(f) in rows:
-        m = rows[fit_key(f)]
-        angles = tuple(float(a) for a in evidence.albedo.theta_i)
-        view["energy"] = physics.energy_verdict(evidence.albedo.fitted[m], evidence.albedo.error[m], angles)
-        view["energy_warn"] = view["energy"].startswith(("returns", "albedo"))
-    return view
-
-
-def _hex(linear: np.ndarray) -> str:
-    code = np.round(255 * encode(np.clip(linear, 0, 1))).astype(int)
-    return "#" + "".join(f"{c:02x}" for c in code)
-
-
-def _model(f: Fit, label: str, channel_names: tuple[str, ...], salt: str) -> View:
-    return {
-        "label": label,
-        "anchor": _anchor(f, label),
-        "formula": _formula(f),
-        "converged": f.converged,
-        "reason": f.reason,
-        "parameters": _parameters(f, channel_names),
-        "remarks": _remarks(f, channel_names),
-        "time": _time(f),
-        "code": f.model is not None,
-    }
-
-
-def _formula(f: Fit) -> str:
-    """The first paragraph of the model's own documentation, which holds the formula."""
-    doc = (type(f.model).__doc__ or "") if f.model is not None else ""
-    return " ".join(doc.split("\n\n")[0].split())
-
-
-def _parameters(f: Fit, channel_names: tuple[str, ...]) -> View:
-    from ..models import parameters_of
-
-    specs = {p.name: p for p in parameters_of(f.model)} if f.model is not None else {}
-    governing = f.governing()
-    count = max((v.size for v in f.parameters.values()), default=1)
-    wide = count <= 4
-    rows = []
-    for name, value in f.parameters.items():
-        spec = specs.get(name)
-        flat = np.atleast_1d(value)
-        sides = [np.broadcast_to(np.atleast_1d(u.get(name, np.nan)), flat.shape) for u in (f.stderr, f.spread)]
-        cells = []
-        for c, v in enumerate(flat):
-            element = f"{name}[{c}]" if value.ndim else name
-            noise, bands = (float(s[c]) for s in sides)
-            larger = np.nanmax([noise, bands]) if math.isfinite(noise) or math.isfinite(bands) else math.nan
-            cells.append(
-                {
-                    "channel": channel_names[c] if value.ndim and c < len(channel_names) else "",
-                    "value": words.uncertain(float(v), float(larger)),
-                    "stderr": significant(noise, 2) if math.isfinite(noise) else None,
-                    "spread": significant(bands, 2) if math.isfinite(bands) else None,
-                    "fixed": name in f.fixed or element in f.fixed,
-                    "undetermined": name in f.undetermined or element in f.undetermined,
-                    "bound": any(re.match(re.escape(element) + r"(?![\w\[])", b) for b in f.at_bound),
-                }
-            )
-        rows.append(
-            {
-                "name": name,
-                "cells": cells,
-                "shared": value.ndim == 0,
-                "meaning": spec.meaning if spec else "",
-                "unit": spec.unit if spec else "",
-                "range": _range(spec.valid.lower, spec.valid.upper, spec.valid.open_lower, spec.valid.open_upper)
-                if spec
-                else words.NONE,
-                "searched": _range(*spec.search) if spec else words.NONE,
-                "governs": governing.get(name),
-            }
-        )
-    heads = list(channel_names[:count]) if count > 1 else ["value"]
-    return {"rows": rows, "wide": wide, "heads": heads, "count": count}
-
-
-def _range(lower: float, upper: float, open_lower: bool = False, open_upper: bool = False) -> str:
-    """An interval in words short enough for a table."""
-    low = _end(lower)
-    high = _end(upper)
-    if math.isinf(lower) and math.isinf(upper):
-        return "any"
-    if math.isinf(upper):
-        return f"{'>' if open_lower else '≥'} {low}"
-    if math.isinf(lower):
-        return f"{'<' if open_upper else '≤'} {high}"
-    return f"{low} … {high}"
-
-
-def _end(x: float) -> str:
-    text = words.minus(f"{x:g}")
-    if "e" not in text:
-        return text
-    mantissa, exponent = f"{x:g}".split("e")
-    return ("" if mantissa == "1" else words.minus(mantissa) + "·") + "10" + words.superscript(int(exponent))
-
-
-def _remarks(f: Fit, channel_names: tuple[str, ...]) -> list[View]:
-    out: list[View] = []
-
-    def say(text: str, warn: bool = False) -> None:
-        out.append({"text": text[:1].upper() + text[1:], "warn": warn})
-
-    def names(elements: Iterable[str]) -> str:
-        return words.listed(_element(e, channel_names) for e in elements)
-
-    at_limit, at_box = _bounds(f)
-    if at_limit:
-        say(f"at the limit of what the model allows: {names(at_limit)}. The data ask for no such part, or for more of it.")
-    if at_box:
-        say(f"at a bound of the search box: {names(at_box)}. A wider box may fit better.", True)
-    if f.undetermined:
-        say(f"not determined by the data: {names(f.undetermined)}. Other values do about as well.", True)
-    if f.fixed:
-        say(f"held fixed: {names(f.fixed)}.")
-    pairs = f.strong_correlations()
-    if pairs:
-        shown = "; ".join(
-            f"{_element(b, channel_names)} with {_element(a, channel_names)} ({words.minus(f'{r:.3f}')})"
-            for a, b, r in pairs[:6]
-        )
-        more = f"; and {words.count(len(pairs) - 6, 'more pair')}" if len(pairs) > 6 else ""
-        say(f"strongly correlated estimates: {shown}{more}. Trust them together, not one by one.")
-    if f.optima and f.starts > 1:
-        best = f.optima[0]
-        error = f" ({f.loss} error {significant(best.error, 4)})" if math.isfinite(best.error) else ""
-        text = f"{words.count(f.starts, 'start')}: {words.number(best.starts)} reached the best optimum{error}"
-        others = [
-            f"{words.number(o.starts)} reached {significant(o.error, 4)}" for o in f.optima[1:5] if math.isfinite(o.error)
-        ]
-        text += "".join(f", {o}" for o in others)
-        left = f.starts - sum(o.starts for o in f.optima)
-        text += f"; {words.number(left)} {'was' if left == 1 else 'were'} not followed to the end." if left > 0 else "."
-        say(text)
-    elif f.starts == 1:
-        say("one start only: a better optimum may exist.", True)
-    known = {n for u in (f.stderr, f.spread) for n, v in u.items() if np.isfinite(v).any()}
-    governing = {n: g for n, g in f.governing().items() if n in known}
-    misfit = [n for n, g in governing.items() if g == "spread"]
-    if misfit and len(misfit) == len(governing):
-        say(
-            "for every parameter the spread over angular bands exceeds the noise: what limits these numbers is the form "
-            "of the model, not the measurement."
-        )
-    elif misfit:
-        say(f"the form of the model, not noise, limits {words.listed(misfit)}.")
-    if f.model is None and f.parameters:
-        say("the code of this model is not part of the package: its numbers are kept, its formula is not.")
-    return out
-
-
-def _element(text: str, channel_names: tuple[str, ...]) -> str:
-    """``specular[1]`` as ``specular G``."""
-
-    def name(match: re.Match[str]) -> str:
-        k = int(match.group(1))
-        return f" {channel_names[k]}" if k < len(channel_names) else match.group(0)
-
-    return re.sub(r"\[(\d+)\]", name, text)
-
-
-def _bounds(f: Fit) -> tuple[list[str], list[str]]:
-    """Parameters at a bound: those where the formula ends, and those where only the search does."""
-    from ..models import parameters_of
-
-    valid = {p.name: (p.valid.lower, p.valid.upper) for p in parameters_of(f.model)} if f.model is not None else {}
-    limit: list[str] = []
-    box: list[str] = []
-    for text in f.at_bound:
-        match = re.match(r"(\w+)(?:\[(\d+)\])?", text)
-        name, index = (match.group(1), int(match.group(2) or 0)) if match else ("", 0)
-        value = np.atleast_1d(f.parameters.get(name, np.nan))
-        at_limit = index < len(value) and value[index] in valid.get(name, ())
-        (limit if at_limit else box).append(text)
-    return limit, box
-
-
-def _time(f: Fit) -> str:
-    parts = [f"{k} {words.seconds(f.seconds[k])}" for k in ("load", "prepare", "compile", "solve") if k in f.seconds]
-    text = ", ".join(parts)
-    if f.passes and "solve" in f.seconds:
-        text += f"; {words.thousands(f.passes)} passes over the table, {words.seconds(f.seconds['solve'] / f.passes)} each"
-    return text + "." if text else ""
 
 
 def _missing(evidence: Evidence | None, without: Sequence[str]) -> list[str]:

@@ -1,0 +1,255 @@
+"""What a report says of one model: its parameters, what to make of them, and what they mean as physics."""
+
+from __future__ import annotations
+
+import math
+import re
+from collections.abc import Iterable
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+
+from . import materials, physics, words
+from .colours import encode
+from .evidence import Evidence
+from .gather import fit_key
+from .words import significant
+
+if TYPE_CHECKING:
+    from ..fitting.result import Fit
+
+View = dict[str, Any]
+
+
+def anchor(f: Fit, label: str) -> str:
+    """Where in the page a model is described."""
+    return re.sub(r"[^A-Za-z0-9]+", "-", f"{f.source}-{f.sha256[:6]}-{label}").strip("-").lower()
+
+
+def physics_view(f: Fit, label: str, evidence: Evidence | None, rows: dict[str, int]) -> View:
+    """The row of one model in the table of physical meanings; ``rows`` are the places of fits in the evidence."""
+    f0 = physics.normal_reflectance(f.model_name, f.parameters)
+    width = physics.lobe_width(f.model_name, f.parameters)
+    view: View = {"label": label, "f0": None, "width": None, "energy": "not computed", "energy_warn": False}
+    if f0 is not None:
+        view["f0"] = {
+            "value": words.triple(f0.value),
+            "expression": f0.expression,
+            "remark": f0.remark,
+            "kind": materials.kind_of(f0.value),
+            "warn": bool(materials.GAP[0] < float(np.mean(f0.value)) < materials.GAP[1] or np.mean(f0.value) > 1),
+            "nearest": None,
+        }
+        if f0.value.shape == (3,) and np.isfinite(f0.value).all():
+            substance, distance = materials.nearest(f0.value)
+            view["f0"]["nearest"] = substance.name
+            view["f0"]["nearest_value"] = " ".join(f"{v:.3g}" for v in substance.f0)
+            view["f0"]["distance"] = significant(distance, 2)
+            view["f0"]["far"] = distance > 0.15
+            view["f0"]["swatch"], view["f0"]["nearest_swatch"] = _hex(f0.value), _hex(np.array(substance.f0))
+    if width is not None:
+        view["width"] = {
+            "half": significant(math.degrees(width.half_width), 3),
+            "alpha": significant(width.alpha, 3),
+            "roughness": significant(width.roughness, 3),
+            "exponent": significant(width.exponent, 3),
+        }
+    if evidence and evidence.albedo and fit_key(f) in rows:
+        m = rows[fit_key(f)]
+        angles = tuple(float(a) for a in evidence.albedo.theta_i)
+        view["energy"] = physics.energy_verdict(evidence.albedo.fitted[m], evidence.albedo.error[m], angles)
+        view["energy_warn"] = view["energy"].startswith(("returns", "albedo"))
+    return view
+
+
+def _hex(linear: np.ndarray) -> str:
+    code = np.round(255 * encode(np.clip(linear, 0, 1))).astype(int)
+    return "#" + "".join(f"{c:02x}" for c in code)
+
+
+def model_view(f: Fit, label: str, channel_names: tuple[str, ...]) -> View:
+    """The section of one model: formula, parameters with their error bars, remarks, time."""
+    return {
+        "label": label,
+        "anchor": anchor(f, label),
+        "formula": _formula(f),
+        "converged": f.converged,
+        "reason": f.reason,
+        "parameters": _parameters(f, channel_names),
+        "remarks": _remarks(f, channel_names),
+        "agreed": _agreed(f),
+        "time": _time(f),
+        "code": f.model is not None,
+    }
+
+
+def _formula(f: Fit) -> str:
+    """The first paragraph of the model's own documentation, which holds the formula."""
+    doc = (type(f.model).__doc__ or "") if f.model is not None else ""
+    return " ".join(doc.split("\n\n")[0].split())
+
+
+def _parameters(f: Fit, channel_names: tuple[str, ...]) -> View:
+    from ..models import parameters_of
+
+    specs = {p.name: p for p in parameters_of(f.model)} if f.model is not None else {}
+    governing = f.governing()
+    count = max((v.size for v in f.parameters.values()), default=1)
+    wide = count <= 4
+    rows = []
+    for name, value in f.parameters.items():
+        spec = specs.get(name)
+        flat = np.atleast_1d(value)
+        sides = [np.broadcast_to(np.atleast_1d(u.get(name, np.nan)), flat.shape) for u in (f.stderr, f.spread)]
+        cells = []
+        for c, v in enumerate(flat):
+            element = f"{name}[{c}]" if value.ndim else name
+            noise, bands = (float(s[c]) for s in sides)
+            larger = np.nanmax([noise, bands]) if math.isfinite(noise) or math.isfinite(bands) else math.nan
+            cells.append(
+                {
+                    "channel": channel_names[c] if value.ndim and c < len(channel_names) else "",
+                    "value": words.uncertain(float(v), float(larger)),
+                    "stderr": significant(noise, 2) if math.isfinite(noise) else None,
+                    "spread": significant(bands, 2) if math.isfinite(bands) else None,
+                    "fixed": name in f.fixed or element in f.fixed,
+                    "undetermined": name in f.undetermined or element in f.undetermined,
+                    "bound": any(re.match(re.escape(element) + r"(?![\w\[])", b) for b in f.at_bound),
+                }
+            )
+        rows.append(
+            {
+                "name": name,
+                "cells": cells,
+                "shared": value.ndim == 0,
+                "meaning": spec.meaning if spec else "",
+                "unit": spec.unit if spec else "",
+                "range": _range(spec.valid.lower, spec.valid.upper, spec.valid.open_lower, spec.valid.open_upper)
+                if spec
+                else words.NONE,
+                "searched": _range(*spec.search) if spec else words.NONE,
+                "governs": governing.get(name),
+            }
+        )
+    heads = list(channel_names[:count]) if count > 1 else ["value"]
+    return {"rows": rows, "wide": wide, "heads": heads, "count": count}
+
+
+def _range(lower: float, upper: float, open_lower: bool = False, open_upper: bool = False) -> str:
+    """An interval in words short enough for a table."""
+    low = _end(lower)
+    high = _end(upper)
+    if math.isinf(lower) and math.isinf(upper):
+        return "any"
+    if math.isinf(upper):
+        return f"{'>' if open_lower else '≥'} {low}"
+    if math.isinf(lower):
+        return f"{'<' if open_upper else '≤'} {high}"
+    return f"{low} … {high}"
+
+
+def _end(x: float) -> str:
+    text = words.minus(f"{x:g}")
+    if "e" not in text:
+        return text
+    mantissa, exponent = f"{x:g}".split("e")
+    return ("" if mantissa == "1" else words.minus(mantissa) + "·") + "10" + words.superscript(int(exponent))
+
+
+def _remarks(f: Fit, channel_names: tuple[str, ...]) -> list[View]:
+    out: list[View] = []
+
+    def say(text: str, warn: bool = False) -> None:
+        out.append({"text": text[:1].upper() + text[1:], "warn": warn})
+
+    def names(elements: Iterable[str]) -> str:
+        return words.listed(_element(e, channel_names) for e in elements)
+
+    at_limit, at_box = _bounds(f)
+    if at_limit:
+        say(f"at the limit of what the model allows: {names(at_limit)}. The data ask for no such part, or for more of it.")
+    if at_box:
+        say(f"at a bound of the search box: {names(at_box)}. A wider box may fit better.", True)
+    if f.undetermined:
+        say(f"not determined by the data: {names(f.undetermined)}. Other values do about as well.", True)
+    if f.fixed:
+        say(f"held fixed: {names(f.fixed)}.")
+    pairs = f.strong_correlations()
+    if pairs:
+        shown = "; ".join(
+            f"{_element(b, channel_names)} with {_element(a, channel_names)} ({words.minus(f'{r:.3f}')})"
+            for a, b, r in pairs[:6]
+        )
+        more = f"; and {words.count(len(pairs) - 6, 'more pair')}" if len(pairs) > 6 else ""
+        say(f"strongly correlated estimates: {shown}{more}. Trust them together, not one by one.")
+    if f.optima and f.starts > 1:
+        best = f.optima[0]
+        error = f" ({f.loss} error {significant(best.error, 4)})" if math.isfinite(best.error) else ""
+        text = f"{words.count(f.starts, 'start')}: {words.number(best.starts)} reached the best optimum{error}"
+        others = [
+            f"{words.number(o.starts)} reached {significant(o.error, 4)}" for o in f.optima[1:5] if math.isfinite(o.error)
+        ]
+        text += "".join(f", {o}" for o in others)
+        left = f.starts - sum(o.starts for o in f.optima)
+        text += f"; {words.number(left)} {'was' if left == 1 else 'were'} not followed to the end." if left > 0 else "."
+        say(text)
+    elif f.starts == 1:
+        say("one start only: a better optimum may exist.", True)
+    known = {n for u in (f.stderr, f.spread) for n, v in u.items() if np.isfinite(v).any()}
+    governing = {n: g for n, g in f.governing().items() if n in known}
+    misfit = [n for n, g in governing.items() if g == "spread"]
+    if misfit and len(misfit) == len(governing):
+        say(
+            "for every parameter the spread over angular bands exceeds the noise: what limits these numbers is the form "
+            "of the model, not the measurement."
+        )
+    elif misfit:
+        say(f"the form of the model, not noise, limits {words.listed(misfit)}.")
+    if f.model is None and f.parameters:
+        say("the code of this model is not part of the package: its numbers are kept, its formula is not.")
+    return out
+
+
+def _element(text: str, channel_names: tuple[str, ...]) -> str:
+    """``specular[1]`` as ``specular G``."""
+
+    def name(match: re.Match[str]) -> str:
+        k = int(match.group(1))
+        return f" {channel_names[k]}" if k < len(channel_names) else match.group(0)
+
+    return re.sub(r"\[(\d+)\]", name, text)
+
+
+def _bounds(f: Fit) -> tuple[list[str], list[str]]:
+    """Parameters at a bound: those where the formula ends, and those where only the search does."""
+    from ..models import parameters_of
+
+    valid = {p.name: (p.valid.lower, p.valid.upper) for p in parameters_of(f.model)} if f.model is not None else {}
+    limit: list[str] = []
+    box: list[str] = []
+    for text in f.at_bound:
+        match = re.match(r"(\w+)(?:\[(\d+)\])?", text)
+        name, index = (match.group(1), int(match.group(2) or 0)) if match else ("", 0)
+        value = np.atleast_1d(f.parameters.get(name, np.nan))
+        at_limit = index < len(value) and value[index] in valid.get(name, ())
+        (limit if at_limit else box).append(text)
+    return limit, box
+
+
+def _agreed(f: Fit) -> str:
+    """What one more exact step over every cell would change, and how the optimum was found."""
+    if f.model is None or not f.passes:
+        return ""
+    search = "compressed search" if f.path == "compressed" else "search that ended on every cell"
+    passes = f"{words.thousands(f.passes)} {'pass' if f.passes == 1 else 'passes'} over the table"
+    if not math.isfinite(f.shift):
+        return f"Every cell asked once more: how far the parameters would move cannot be said ({search}, {passes})."
+    far = max(f.shift, 0.001)
+    digit = 10.0 ** math.floor(math.log10(far))
+    far = math.ceil(far / digit - 1e-9) * digit  # up to one digit: what is said is a bound
+    return f"Every cell asked once more: no parameter would move by more than {far:g} standard errors ({search}, {passes})."
+
+
+def _time(f: Fit) -> str:
+    parts = [f"{k} {words.seconds(f.seconds[k])}" for k in ("load", "prepare", "compile", "solve") if k in f.seconds]
+    return ", ".join(parts) + "." if parts else ""

@@ -1,0 +1,159 @@
+"""The numbers and words of a report: albedo, F0, widths, digits, grades, colours."""
+
+import math
+
+import brdfit
+import numpy as np
+import pytest
+from brdfit import references
+from brdfit.models import MODELS
+from brdfit.reports import materials, physics, words
+from brdfit.reports.colours import delta_e, encode, exposure_of, screen
+
+
+def test_albedo_of_lambert_is_its_diffuse():
+    rho, error = physics.directional_albedo(brdfit.model("lambert", diffuse=[0.2, 0.5, 0.8]))
+    # the quadrature of a constant: its own error estimate holds, and is small up to grazing
+    np.testing.assert_allclose(rho, np.broadcast_to([0.2, 0.5, 0.8], rho.shape), atol=2e-3)
+    assert (np.abs(rho - [0.2, 0.5, 0.8]) <= error + 1e-9).mean() > 0.9
+
+
+@pytest.mark.parametrize("alpha", [0.003, 0.05, 0.3, 0.9])
+def test_quadrature_in_a_weak_white_furnace(alpha):
+    """D / (4 cos_i cos_o) at normal incidence returns what GGX has within 45 degrees: 1/(1 + alpha^2), in closed form."""
+
+    def lobe(wi, wo):
+        h = wi + wo
+        h /= np.linalg.norm(h, axis=-1, keepdims=True)
+        sin2, cos2 = h[..., 0] ** 2 + h[..., 1] ** 2, h[..., 2] ** 2
+        d = alpha**2 / (np.pi * (sin2 + alpha**2 * cos2) ** 2)
+        # the weight of a viewer at the horizon is 0: its value is not needed
+        return (d / (4 * wi[..., 2] * np.maximum(wo[..., 2], 1e-12)))[..., None]
+
+    rho, error = physics.directional_albedo(lobe, (0.0,))
+    assert rho[0, 0] == pytest.approx(1 / (1 + alpha**2), abs=1e-6)
+    assert abs(rho[0, 0] - 1 / (1 + alpha**2)) <= error[0, 0] + 1e-9
+
+
+@pytest.mark.parametrize("alpha", [0.003, 0.3, 0.9])
+def test_white_furnace(alpha):
+    """A lobe of F = 1 with masking returns no more than all, and no more than without masking."""
+    mirror = brdfit.model("gtr", diffuse=[0.0], specular=[1.0], alpha=alpha, gamma=2.0)
+    rho, error = physics.directional_albedo(mirror)
+    assert (rho <= 1 + error + 1e-6).all()
+    assert rho[0, 0] < 1 / (1 + alpha**2) + error[0, 0]
+    assert rho[0, 0] > 0.999 or alpha > 0.003
+    assert "conserves energy" in physics.energy_verdict(rho, error)
+
+
+def test_ward_returns_too_much_and_the_verdict_says_from_where():
+    alpha = 0.1
+    rho, error = physics.directional_albedo(brdfit.model("ward", diffuse=[0.3], specular=[0.9], alpha=alpha))
+    # at normal incidence, by midpoints in theta_h: cos_o = cos 2 theta, do = 4 cos theta dh
+    t = (np.arange(100_000) + 0.5) / 100_000 * np.pi / 4
+    part = np.exp(-((np.tan(t) / alpha) ** 2)) / (np.pi * alpha**2) * np.sqrt(np.cos(2 * t)) * np.cos(t)
+    exact = 0.3 + 0.9 * np.sum(part * 2 * np.pi * np.sin(t)) * np.pi / 4 / 100_000
+    assert rho[0, 0] == pytest.approx(exact, abs=1e-5)
+    verdict = physics.energy_verdict(rho, error)
+    assert verdict.startswith("returns more light than falls on it: albedo ≤ 1 nowhere")
+    falling = physics.energy_verdict(np.array([[0.5], [0.9], [1.2]]), np.zeros((3, 1)), (0.0, 45.0, 80.0))
+    assert falling == "returns more light than falls on it: albedo ≤ 1 only up to 45°, 1.20 at 80°"
+
+
+def test_copper_is_copper():
+    substance, distance = materials.nearest([0.95, 0.64, 0.54])
+    assert substance.name == "copper"
+    assert distance < 0.01
+    assert materials.nearest([0.04, 0.04, 0.04])[0].kind == "dielectric"
+    assert "hardly any material" in materials.kind_of([0.3, 0.3, 0.3])
+    assert "dielectrics" in materials.kind_of(0.04)
+    assert "metals" in materials.kind_of([0.9, 0.9, 0.9])
+    with pytest.raises(ValueError, match="linear RGB"):
+        materials.nearest([0.5])
+
+
+def test_f0_of_models_that_have_no_such_parameter():
+    n = 2.0
+    of = physics.normal_reflectance
+    abc = of("abc", {"specular": np.array([1.3, 0.9]), "b": np.array(5.0), "c": np.array(1.0), "ior": np.array(n)})
+    np.testing.assert_allclose(abc.value, np.array([1.3, 0.9]) / 9)  # ((2 - 1)/(2 + 1))^2
+    sgd = of("sgd", {"specular": np.array([0.5]), "f0": np.array([0.9]), "f1": np.array([0.1])})
+    np.testing.assert_allclose(sgd.value, [0.4])
+    assert of("ward", {"specular": np.array([0.3])}) is None
+    assert of("lambert", {"diffuse": np.array([0.3])}) is None
+
+
+DISTRIBUTIONS = [
+    ("gtr", {"alpha": 0.05, "gamma": 1.3}, lambda s2: (s2 + 0.05**2 * (1 - s2)) ** -1.3),
+    ("abc", {"b": 700.0, "c": 1.9}, lambda s2: (1 + 700 * (1 - np.sqrt(1 - s2))) ** -1.9),
+    (
+        "sgd",
+        {"alpha": 0.02, "p": 0.6},
+        lambda s2: np.exp(-(0.02 + s2 / (1 - s2) / 0.02)) * (0.02 + s2 / (1 - s2) / 0.02) ** -0.6 / (1 - s2) ** 2,
+    ),
+    ("ward", {"alpha": 0.1}, lambda s2: np.exp(-s2 / (1 - s2) / 0.01)),
+    ("ashikhmin_shirley", {"exponent": 300.0}, lambda s2: (1 - s2) ** 150),
+]
+"""Models, parameters and their D up to a factor, as MODELS.md writes it, of sin^2(theta_h)."""
+
+
+@pytest.mark.parametrize(("name", "parameters", "d"), DISTRIBUTIONS, ids=[c[0] for c in DISTRIBUTIONS])
+def test_half_width_is_where_d_halves(name, parameters, d):
+    width = physics.lobe_width(name, {k: np.array(v) for k, v in parameters.items()})
+    assert d(np.sin(width.half_width) ** 2) / d(0.0) == pytest.approx(0.5, rel=1e-9)
+
+
+def test_no_half_width_no_number():
+    assert physics.lobe_width("lambert", {"diffuse": np.array([0.5])}) is None
+    assert physics.lobe_width("gtr", {"alpha": np.array(1.5), "gamma": np.array(2.0)}) is None
+    assert physics.lobe_width("abc", {"b": np.array(1.0), "c": np.array(0.1)}) is None
+    assert physics.lobe_width("ashikhmin_shirley", {"exponent": np.array(0.0)}) is None
+
+
+def test_equivalents_of_ggx_are_exact():
+    width = physics.lobe_width("gtr", {"alpha": np.array(0.3), "gamma": np.array(2.0)})
+    assert width.alpha == pytest.approx(0.3)
+    assert width.roughness == pytest.approx(math.sqrt(0.3))
+    assert width.exponent == pytest.approx(2 / 0.09 - 2)
+
+
+@pytest.mark.parametrize(
+    ("value", "sigma", "text"),
+    [
+        (0.951234, 0.0123, "0.951"),
+        (0.951234, 0.000123, "0.95123"),
+        (1234567.0, 89.0, "1.234567·10⁶"),
+        (200.0, 1200.0, "200"),
+        (-0.5, 0.01, "\u22120.500"),
+        (0.25, math.nan, "0.2500"),
+        (0.0, 0.1, "0"),
+        (9.999, 0.1, "10.0"),
+    ],
+)
+def test_digits_follow_the_uncertainty(value, sigma, text):
+    assert words.uncertain(value, sigma) == text
+
+
+def test_grades_follow_the_error():
+    assert words.grade(0.012) == "hardly anyone sees a difference"
+    assert words.grade(0.0121) != words.grade(0.012)
+    assert words.grade(math.nan) == "no error could be computed"
+    assert [words.grade_index(e) for e in (0.001, 0.02, 0.03, 0.3)] == [0, 1, 2, 3]
+
+
+def test_colours_stay_linear_until_the_end():
+    # IEC 61966-2-1: 12.92 x near black, 1.055 x^(1/2.4) - 0.055 above
+    np.testing.assert_allclose(encode(np.array([0.0, 0.002, 0.18, 1.0])), [0, 0.02584, 0.461356, 1], atol=1e-5)
+    grey = np.array([[0.18, 0.18, 0.18]])
+    assert delta_e(grey, grey)[0] == pytest.approx(0, abs=1e-9)
+    assert np.isnan(delta_e(grey, grey * np.nan)).all()
+    values = np.full((4, 3), 7.0)
+    assert screen(values, exposure_of(values)) == pytest.approx(0.18)
+
+
+def test_every_reference_of_a_model_is_known():
+    for forms in MODELS.values():
+        for form in forms:
+            assert set(form.references) <= set(references.REFERENCES), form
+    assert references.cite(["ward1992", "ward1992"]) == [references.REFERENCES["ward1992"]]
+    assert references.cite(["my own paper, 2026"]) == ["my own paper, 2026"]
