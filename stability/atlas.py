@@ -19,11 +19,11 @@ Reals = NDArray[np.float64]
 Points = list[tuple[str, str, Reals, tuple[int, ...]]]
 
 PRECISIONS = {"float64": np.float64, "float32": np.float32}
-ROWS, ROWS_OF_INTEGRALS = 12, 6
-SCATTERED, SCATTERED_INTEGRALS = 200, 12
+ROWS, ROWS_OF_INTEGRALS = 8, 4
+SCATTERED, SCATTERED_INTEGRALS = 100, 8
 SCATTERED_SINGLE = 4000
 """Points over the whole domain in float32, whose reference is float64."""
-DRAWS, DRAWS_OF_INTEGRALS = 50_000, 5_000
+DRAWS, DRAWS_OF_INTEGRALS = 20_000, 2_000
 """Random draws that must be finite, unless asked for more."""
 
 
@@ -76,10 +76,10 @@ def survey(draws: int | None = None, say: Callable[[str], None] = lambda text: N
             count = draws or (DRAWS_OF_INTEGRALS if part.integral else DRAWS)
             for precision, dtype in PRECISIONS.items():
                 partial[part, precision] = _finite_record(part, precision, not_finite(part, count, dtype), count)
-        say("references of 40 digits")
         found = {}
         for keys, future in waiting:
             found.update(zip(keys, future.result(), strict=True))
+            say(f"references: {len(found)}")
     return [_measured(partial[part, precision], part, plans[part], found) for part in PARTS for precision in PRECISIONS]
 
 

@@ -99,7 +99,7 @@ def _picture(records: Sequence[Record]) -> bytes:
     with rc_context({"font.size": 6, "axes.linewidth": 0.4, "xtick.major.width": 0.3, "ytick.major.width": 0.3}):
         figure = Figure(figsize=(8.2, 0.35 + 1.15 * len(pairs)), layout="constrained")
         FigureCanvasAgg(figure)
-        axes = figure.subplots(len(pairs), 4, squeeze=False, sharex=False, sharey=False)
+        axes = figure.subplots(max(len(pairs), 1), 4, squeeze=False)  # the V-cavity alone has no map
         for line, (record, m) in zip(axes, pairs, strict=True):
             other = single[record.name, m.varied]
             panels = ((m.value, "float64"), (m.slope, "float64"), (other.value, "float32"), (other.slope, "float32"))

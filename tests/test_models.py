@@ -56,6 +56,12 @@ def test_every_model_has_cases():
             models.build(r.model, dict(case))  # each lies where the formula is defined
 
 
+def test_cases_are_many():
+    """2,000 of each closed form and 500 of each model with a Smith integral, in value; corners included."""
+    for r in TABLE:
+        assert len(r.cases) * len(r.directions()[0]) >= (500 if r.few else 2000), r.name
+
+
 def test_every_part_has_cases():
     functions = {n for n, f in vars(cases.ndf).items() if not n.startswith("_") and callable(f)}
     assert functions == set(cases.NDFS) | set(cases.ANISOTROPIC_NDFS)
