@@ -28,11 +28,11 @@ def expm1_ratio(x: ArrayLike) -> Scalars:
     """
     x = jnp.asarray(x)
     small = jnp.abs(x) < 1
-    near = jnp.where(small, x, 0.0)
+    near = jnp.where(small, x, 0.0)  # guard: overflow of the series (test_special.py::test_expm1_ratio_far_out)
     series = jnp.full_like(near, _PHI1[-1])
     for coefficient in reversed(_PHI1[:-1]):
         series = series * near + coefficient
-    far = jnp.where(small, 1.0, x)  # guard: 0/0 in the value, and in the derivative of the unused branch
+    far = jnp.where(small, 1.0, x)  # guard: 0/0, in the derivative too (test_special.py::test_expm1_ratio_derivatives)
     return jnp.where(small, series, jnp.expm1(far) / far)
 
 
@@ -49,7 +49,7 @@ def log1p_ratio(x: ArrayLike) -> Scalars:
     for k in range(8, -1, -1):
         series = series * z2 + 1.0 / (2 * k + 1)
     series = 2 / (2 + near) * series
-    far = jnp.where(small, 1.0, x)  # guard: 0/0
+    far = jnp.where(small, 1.0, x)  # guard: 0/0 (test_special.py::test_log1p_ratio_derivatives)
     return jnp.where(small, series, jnp.log1p(far) / far)
 
 

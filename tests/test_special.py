@@ -50,9 +50,9 @@ def test_expm1_ratio_derivatives():
 
 
 def test_expm1_ratio_far_out():
-    """Down to (1 - gamma) M of the steepest GTR, and up to the overflow of exp."""
-    value, first, second = derivatives(expm1_ratio, np.array([-1e9, 700.0]))
-    np.testing.assert_allclose(value, [1e-9, float(mp.expm1(700) / 700)], rtol=1e-12)
+    """Beyond (1 - gamma) M of the steepest GTR, where the series overflows, and up to the overflow of exp."""
+    value, first, second = derivatives(expm1_ratio, np.array([-1e18, -1e9, 700.0]))
+    np.testing.assert_allclose(value, [1e-18, 1e-9, float(mp.expm1(700) / 700)], rtol=1e-12)
     assert np.isfinite(first).all()
     assert np.isfinite(second).all()
 
