@@ -70,10 +70,12 @@ def hold_slopes(f: Callable[..., Scalars], *arguments: ArrayLike) -> Scalars:
     @held.defjvp
     def _(point: tuple[Scalars, ...], tangent: tuple[Scalars, ...]) -> tuple[Scalars, Scalars]:
         def slope(move: Scalars) -> Scalars:
-            return jax.jvp(f, point, tuple(jnp.full_like(x, m) for x, m in zip(point, move, strict=True)))[1]
+            along: Array = jax.jvp(f, point, tuple(jnp.full_like(x, m) for x, m in zip(point, move, strict=True)))[1]
+            return along
 
         slopes = jax.vmap(slope)(jnp.eye(len(point), dtype=jnp.float32))
         slopes = jnp.clip(slopes, -SLOPE_LIMIT, SLOPE_LIMIT)
-        return f(*point), sum(s * t for s, t in zip(slopes, tangent, strict=True))  # type: ignore[return-value]
+        return f(*point), sum((s * t for s, t in zip(slopes, tangent, strict=True)), jnp.zeros((), jnp.float32))
 
-    return held(*(jnp.asarray(x, jnp.float32) for x in arguments))
+    value: Array = held(*(jnp.asarray(x, jnp.float32) for x in arguments))
+    return value

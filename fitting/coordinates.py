@@ -155,7 +155,7 @@ def _gtr_chart(narrow: bool) -> Chart:
 
     def flat(x: dict[str, float]) -> bool:
         """Whether D is all but constant, K < 0.1: what lies beyond has alpha on the other side of 1."""
-        return x["alpha"] + x["gamma"] < np.log(0.1)
+        return bool(x["alpha"] + x["gamma"] < np.log(0.1))
 
     box = (float(np.log(1e-9)), float(np.log(limit)))
     return replace(_rewritten(plain, to_parameters, from_parameters, alpha=box), end=flat)

@@ -62,15 +62,16 @@ def _columns(function: Callable[[list[Array]], Array], x: list[Array]) -> tuple[
     copies of the value equal.
     """
     columns = []
-    function = jax.jit(function)  # the model is traced once; derivatives are taken of what was traced
+    traced: Any = jax.jit(function)  # the model is traced once; derivatives are taken of what was traced
     for k in range(len(x)):
 
-        def along(t: Array, k: int = k) -> Array:
-            return function([*x[:k], t, *x[k + 1 :]])
+        def along(t: Array, k: int = k) -> Any:
+            return traced([*x[:k], t, *x[k + 1 :]])
 
         _, tangent = jax.jvp(along, (x[k],), (jnp.ones_like(x[k]),))
         columns.append(tangent)
-    return columns, function(x)
+    value: Array = traced(x)
+    return columns, value
 
 
 def _root_weight(loss: Loss, g: Geometry, weight: Array) -> Array:

@@ -89,7 +89,8 @@ class Samples(eqx.Module):
         if nodes is None:
             return self.cells.at(i)
         # the index that is not used is clipped by the lookup, and its block is never read
-        return jax.lax.cond(i < count, lambda: nodes.at(i), lambda: self.cells.at(i - count))
+        block: tuple[Geometry, Array, Array] = jax.lax.cond(i < count, lambda: nodes.at(i), lambda: self.cells.at(i - count))
+        return block
 
     def channel(self, c: int) -> Samples:
         """The same cells with channel c alone."""
@@ -215,7 +216,7 @@ def compress(whole: Samples, table: Table, used: NDArray[np.bool_], max_angle: f
     remainder = np.zeros(table.channels)
     for at, g in zip(chunks, geometries, strict=True):
         part = np.ix_(rows[0][at], rows[1])
-        planes = np.where(used[part], table.planes[:, *part], 0.0)
+        planes = np.stack([np.where(used[part], plane[part], 0.0) for plane in table.planes])
         transformed = np.asarray(loss.transform(jnp.asarray(planes), g))
         reduced[:, at], kept = rules.compress(transformed, at)
         remainder += np.einsum("hdp,chdp,chdp->c", weight[at], transformed, transformed) - kept

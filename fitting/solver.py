@@ -94,7 +94,7 @@ class BoxDescent(optx.AbstractDescent[Any, Any, Any]):
         gauss_newton = state.matrix / scale[:, None] / scale
         hessian = gauss_newton + state.second / scale[:, None] / scale
         lower, upper = (self.box.lower - state.y) * scale, (self.box.upper - state.y) * scale
-        boxed = jax.vmap(lambda matrix: self._boxed(matrix, gradient, damping, lower, upper))
+        boxed: Any = jax.vmap(lambda matrix: self._boxed(matrix, gradient, damping, lower, upper))
         d, newton = boxed(jnp.stack([gauss_newton, hessian]))
         convex = (newton @ hessian @ newton > 0) & (gradient @ newton < 0)
         d = jnp.where(state.augmented & convex, newton, d)
@@ -107,7 +107,7 @@ class BoxDescent(optx.AbstractDescent[Any, Any, Any]):
         held = ~self.box.free | outward
 
         def one_round(_: int, carry: tuple[Array, Array, Array]) -> tuple[Array, Array, Array]:
-            held, at, _ = carry
+            held, at, _last = carry
             moving = ~held
             a = jnp.where(moving[:, None] & moving, matrix, 0.0) + jnp.diag(jnp.where(moving, damping, 1.0))
             rhs = jnp.where(moving, -(gradient + matrix @ jnp.where(held, at, 0.0)), at)

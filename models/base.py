@@ -157,10 +157,11 @@ def _single_precision(model: BRDF, wi: Float[Array, "... 3"], wo: Float[Array, "
 
     def one(m: BRDF) -> Array:
         leaves, kind = jax.tree.flatten(m)
+        rebuild: Any = kind
 
         def value(*x: Array) -> Array:
             g = from_directions(jnp.stack(x[-6:-3], -1), jnp.stack(x[-3:], -1))
-            return jnp.broadcast_to(kind.unflatten(x[:-6]).evaluate(g), g.shape)
+            return jnp.broadcast_to(rebuild.unflatten(x[:-6]).evaluate(g), g.shape)
 
         return hold_slopes(value, *leaves, *directions)
 

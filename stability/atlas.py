@@ -76,7 +76,7 @@ def survey(draws: int | None = None, say: Callable[[str], None] = lambda text: N
             count = draws or (DRAWS_OF_INTEGRALS if part.integral else DRAWS)
             for precision, dtype in PRECISIONS.items():
                 partial[part, precision] = _finite_record(part, precision, not_finite(part, count, dtype), count)
-        found = {}
+        found: dict[Any, Any] = {}
         for keys, future in waiting:
             found.update(zip(keys, future.result(), strict=True))
             say(f"references: {len(found)}")
@@ -152,7 +152,7 @@ def _worst(part: Part, points: Reals, error: Reals, names: Sequence[str]) -> Wor
     error = np.where(np.isnan(error), 0, error)
     k, column = np.unravel_index(np.argmax(error), error.shape)
     return Worst(
-        float(error[k, column]), names[column], {a: float(x) for a, x in zip(part.arguments, points[k], strict=True)}
+        float(error[k, column]), names[int(column)], {a: float(x) for a, x in zip(part.arguments, points[k], strict=True)}
     )
 
 

@@ -55,13 +55,13 @@ def errors(
     """
     smallest = SMALLEST_SINGLE if dtype is np.float32 else part.smallest
     value = np.abs(got[0] - want[0]) / (np.abs(want[0]) + smallest[0])
-    size = np.where(points == 0, 1, np.abs(points))
-    size[:, list(part.cosines)] = 1
+    size = np.where(np.abs(points) < 1e-100, 1, np.abs(points))
+    size[:, np.asarray(part.cosines, int)] = 1
     natural = np.abs(want[0])[:, None] / size
     slope = np.abs(got[1] - want[1]) / (np.maximum(np.abs(want[1]), natural) + smallest[1])
     if part.kinked:
         level = np.abs(points[:, part.arguments.index("wi_z")] - points[:, part.arguments.index("wo_z")]) < 1e-6
-        slope[np.ix_(level, list(part.cosines))] = np.nan
+        slope[np.ix_(level, np.asarray(part.cosines, int))] = np.nan
     if dtype is np.float32:
         slope[(np.abs(want[1]) > LARGEST_SLOPE).any(1)] = np.nan
     return value, slope

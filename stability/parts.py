@@ -229,12 +229,12 @@ PARTS: tuple[Part, ...] = (
     _anisotropic(
         "power_cosine_anisotropic",
         "AshikhminShirleyAnisotropic",
-        lambda ex, ey, g: ndf.power_cosine_anisotropic(*g.tangential(), g.cos2_h, ex, ey),
+        lambda ex, ey, g: ndf.power_cosine_anisotropic(g.tangential()[0], g.tangential()[1], g.cos2_h, ex, ey),
     ),
     _anisotropic(
         "anisotropic_gaussian",
         "WardAnisotropic",
-        lambda ax, ay, g: ndf.anisotropic_gaussian(*g.tangential(), g.cos2_h, ax, ay),
+        lambda ax, ay, g: ndf.anisotropic_gaussian(g.tangential()[0], g.tangential()[1], g.cos2_h, ax, ay),
     ),
     _smith("GTR", ndf.GTR),
     _smith("SGD", ndf.SGD),
