@@ -63,7 +63,7 @@ def value_and_slopes(group: str, name: str, point: Sequence[float], cosines: Seq
     f = REFERENCES[group][name]
     with mp.workdps(oracle.DIFFERENCE_DIGITS):
         exact = [mpf(float(x)) for x in point]
-        below_one = 1 - 100 * oracle.STEP
+        below_one = 1 - mpf(10) ** -12  # nearer, what the integral leaves out at its ends counts as 1/sine
         slopes = []
         for k, x in enumerate(exact):
             centre = min(x, below_one) if k in cosines else x
