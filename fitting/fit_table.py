@@ -38,6 +38,8 @@ TOLERATED = 0.1
 """Standard errors by which compression of the table may move a parameter."""
 EXACT = 1e-8
 """Error, relative to what the parameters do to the residual, below which a fit is exact: polar tables are good to 3e-9."""
+BLACK = 1e-14
+"""Error below which a fit is exact whatever the parameters: a black channel has nothing to be small against."""
 
 _errors = eqx.filter_jit(loss_errors)
 
@@ -316,7 +318,7 @@ def _ending(end: Minimum) -> tuple[bool, str]:
     error, cosine, steps = float(np.sqrt(end.cost)), float(end.optimality), int(end.steps)
     if not np.isfinite(error) or error > 1e140:
         return False, "no start gave a finite error: the model is not defined where the data are"
-    if error <= EXACT * float(end.scale):
+    if error <= max(EXACT * float(end.scale), BLACK):
         return True, f"exact fit: the error is {error:.1g}, which is rounding"
     if not bool(end.stopped):
         return False, f"stopped at the limit of {steps} steps; the gradient is still {cosine:.1g} (cosine to the residual)"
