@@ -1,11 +1,7 @@
-"""Evaluating fitted models on many directions, in float64 and with one compilation for each model."""
+"""Evaluating a fitted model on many directions, in float64 and with one compilation."""
 
 from __future__ import annotations
 
-import os
-from collections.abc import Callable, Sequence
-from concurrent.futures import ThreadPoolExecutor
-from functools import cache
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
@@ -18,18 +14,6 @@ Reals = NDArray[np.float64]
 
 BLOCK = 4096
 """Directions that a model sees at once."""
-
-
-def evaluate_each(
-    models: Sequence[BRDF | None], wi: Reals, wo: Reals, count: int, meanwhile: Callable[[], object] = lambda: None
-) -> Reals:
-    """Values ``[M, n, C]`` of each model. They compile side by side, outside Python's lock, while ``meanwhile`` runs."""
-    if any(m is not None for m in models):
-        _program()  # one for all threads
-    with ThreadPoolExecutor(min(os.cpu_count() or 1, len(models) or 1)) as pool:
-        values = [pool.submit(evaluate, m, wi, wo, count) for m in models]
-        meanwhile()
-        return np.stack([v.result() for v in values]) if values else np.zeros((0, len(wi), count))
 
 
 def evaluate(model: BRDF | None, wi: Reals, wo: Reals, count: int) -> Reals:
@@ -51,13 +35,17 @@ def evaluate(model: BRDF | None, wi: Reals, wo: Reals, count: int) -> Reals:
     return np.broadcast_to(out.reshape(n, -1)[: len(wi)], (len(wi), count))
 
 
-@cache
+_compiled: list[Any] = []
+
+
 def _program() -> Any:
     """The one compiled function, made on first use so that rebuilding a report does not import JAX for it."""
-    import equinox as eqx
-    import jax
+    if not _compiled:
+        import equinox as eqx
+        import jax
 
-    def run(model: BRDF, wi: Any, wo: Any) -> Any:
-        return jax.lax.map(lambda pair: model(*pair), (wi, wo))
+        def run(model: BRDF, wi: Any, wo: Any) -> Any:
+            return jax.lax.map(lambda pair: model(*pair), (wi, wo))
 
-    return eqx.filter_jit(run)
+        _compiled.append(eqx.filter_jit(run))
+    return _compiled[0]

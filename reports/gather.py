@@ -15,8 +15,8 @@ from numpy.typing import NDArray
 
 from ..angles import directions, half_difference
 from ..tables import HalfDifferenceGrid, SphericalGrid, Table
-from .colours import channel_names, delta_e, exposure_of, library, screen
-from .evaluate import evaluate_each
+from .colours import channel_names, delta_e, exposure_of, screen
+from .evaluate import evaluate
 from .evidence import Albedo, Evidence, Lobes, Maps, Sphere
 from .physics import ANGLES, albedo_directions, albedo_of_values
 
@@ -57,7 +57,11 @@ def gather(table: Table, fits: Sequence[Fit]) -> Evidence:
     pieces = [lobe_at[1:3] if lobe_at else None, sphere_at[1:3], albedo_at[:2], cells_at[:2]]
     sizes = [0 if p is None else p[0].shape[0] for p in pieces]
     wi, wo = (np.concatenate([p[k] for p in pieces if p is not None]) for k in (0, 1))
-    values = evaluate_each([f.model for f in fits], wi, wo, table.channels, meanwhile=library)
+    values = (
+        np.stack([evaluate(f.model, wi, wo, table.channels) for f in fits])
+        if fits
+        else np.zeros((0, len(wi), table.channels))
+    )
     at_lobes, at_sphere, at_albedo, at_cells = np.split(values, np.cumsum(sizes)[:-1], axis=1)
 
     lobes = None
