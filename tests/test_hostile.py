@@ -118,7 +118,7 @@ def test_hostile_tables(model):
     assert not faults
 
 
-@pytest.mark.parametrize("loss", ["ngan", "cuberoot", "relative", "perceptual"])
+@pytest.mark.parametrize("loss", ["cuberoot", "relative"])
 def test_hostile_tables_under_other_losses(loss):
     for name in ("zeros", "black channel", "from 1e-9 to 1e9", "one cell", "outliers"):
         check(brdfit.fit(HOSTILE[name](), "ward", loss=loss))
