@@ -100,7 +100,7 @@ def _picture(records: Sequence[Record]) -> bytes:
         figure = Figure(figsize=(8.2, 0.35 + 1.15 * len(pairs)), layout="constrained")
         FigureCanvasAgg(figure)
         axes = figure.subplots(max(len(pairs), 1), 4, squeeze=False)  # the V-cavity alone has no map
-        for line, (record, m) in zip(axes, pairs, strict=True):
+        for line, (record, m) in zip(axes, pairs, strict=False):
             other = single[record.name, m.varied]
             panels = ((m.value, "float64"), (m.slope, "float64"), (other.value, "float32"), (other.slope, "float32"))
             for k, (ax, (error, precision)) in enumerate(zip(line, panels, strict=True)):
