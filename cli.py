@@ -111,7 +111,7 @@ def fit_command(
 
     from .environment import environment
     from .fitting import fit_many
-    from .reports import gather, rebuild_report, save_evidence, write_fits
+    from .reports import Views, preload, rebuild_report, save_evidence, write_fits
 
     fits: list[Fit] = []
     evidence: list[Evidence] = []
@@ -122,14 +122,18 @@ def fit_command(
             for path in files:
                 table = load(path, angles=angles)
                 progress.say(f"{table.material}: fitting")
-                first = len(fits)
+                first, views = len(fits), None
                 for f in fit_many([table], names, loss=loss, measure=measure, max_angle=max_angle, seed=seed):
                     fits[first:] = sorted([*fits[first:], f], key=lambda f: names.index(f.model_name))
                     write_fits(out, fits, where)
                     progress.advance(_line(f))
-                if report:
+                    if report:  # meanwhile the next fits go on
+                        preload()
+                        views = views or Views(table, max_angle)
+                        views(f)
+                if views:
                     progress.say(f"{table.material}: drawing")
-                    evidence.append(gather(table, fits[first:]))
+                    evidence.append(views.evidence(fits[first:]))
         except KeyboardInterrupt:
             interrupted = True
         if report and fits:

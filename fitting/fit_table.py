@@ -9,17 +9,16 @@ from dataclasses import dataclass, replace
 from typing import Any
 from weakref import WeakKeyDictionary
 
-import equinox as eqx
 import jax
-import jax.numpy as jnp
 import numpy as np
 from jaxtyping import ArrayLike
 from numpy.typing import NDArray
 
 from ..models import BRDF, channels, parameter_values, parameters_of, variants
+from ..programs import program
 from ..tables import Table
 from .coordinates import Chart, charts
-from .estimate import Part, combine, estimate_of
+from .estimate import Judgement, judge
 from .gram import Problem, Span, loss_errors
 from .losses import LOSSES, Loss, LossFunction, named_loss
 from .result import Fit, Named, Optimum
@@ -41,7 +40,7 @@ EXACT = 1e-8
 BLACK = 1e-14
 """Error below which a fit is exact whatever the parameters: a black channel has nothing to be small against."""
 
-_errors = eqx.filter_jit(loss_errors)
+_errors = program(loss_errors)
 
 
 @dataclass(frozen=True)
@@ -156,18 +155,16 @@ def fit(
         if given:
             proposals.insert(0, {**proposals[0], **_per_channel(cls, given, table.channels)})
         proposals = [{**p, **_per_channel(cls, held, table.channels)} for p in proposals]
-        ended = [settle(f) for f in _search(forms, ready.samples, bound_loss, proposals, frozenset(held))]
-        found = [f for f, _ in ended]
-        estimate = combine(cls, [part for _, part in ended])
         named = _named_losses(table.planes[:, used], bound_loss)
-        fitted = cls(**estimate.parameters)
-        errors = np.asarray(_errors(fitted, ready.samples, named))
+        found = _search(forms, ready.samples, bound_loss, proposals, frozenset(held))
+        found, judged = settle(found, Problem(ready.samples, bound_loss, found[0].problem.chart), named)
+        errors = judged.errors
     converged, reason = _verdict(found)
     solve = time.perf_counter() - prepared - compiled.seconds
     return Fit(
         **frame,
-        **vars(estimate),
-        model=fitted,
+        **vars(judged.estimate),
+        model=cls(**judged.estimate.parameters),
         converged=converged,
         reason=reason,
         errors={e.name: float(v) for e, v in zip(named, errors, strict=True)},
@@ -181,23 +178,34 @@ def fit(
         optima=_scaled(found, float(errors[[e.name for e in named].index(bound_loss.name)])),
         passes=max(f.passes for f in found),
         path="exact" if any(f.exact for f in found) else "compressed",
-        shift=max(part.shift for _, part in ended),
+        shift=float(judged.shift.max(initial=0.0)),
     )
 
 
-def settle(found: Found) -> tuple[Found, Part]:
-    """Error bars of an optimum, after the whole table agreed to it.
+def settle(found: list[Found], whole: Problem, losses: tuple[Loss, ...]) -> tuple[list[Found], Judgement]:
+    """Optima, of all channels or of each, judged by the whole table.
 
     An optimum of the compressed table stands if the cells themselves, asked with one exact Gauss-Newton step, would move
     no parameter by more than :data:`TOLERATED` standard errors. Otherwise the search ends on the cells.
     """
-    part = estimate_of(found.problem, found.minimum, found.box)
-    if found.exact or part.shift <= TOLERATED:
-        return replace(found, passes=found.passes + 1), part
-    stage = Stage.of(Span.cells(found.problem.samples), 1e-9, 1e-6)
-    end = solve(found.problem, found.minimum.x, found.box, stage)
-    found = replace(found, minimum=end, passes=found.passes + int(end.steps) + 2, exact=True)
-    return found, estimate_of(found.problem, end, found.box)
+
+    def judged(found: list[Found]) -> Judgement:
+        x = np.concatenate([np.asarray(f.minimum.x) for f in found])
+        boxes = [(f.box.lower, f.box.upper, f.box.free) for f in found]
+        box = Box(*(np.concatenate([np.asarray(b) for b in side]) for side in zip(*boxes, strict=True)))
+        return judge(whole, x, box, losses)
+
+    found = [replace(f, passes=f.passes + 1) for f in found]
+    judgement = judged(found)
+    again = False
+    for i, shift in enumerate(np.split(judgement.shift, len(found))):
+        f = found[i]
+        if not f.exact and shift.max(initial=0.0) > TOLERATED:
+            stage = Stage.of(Span.cells(f.problem.samples), 1e-9, 1e-6)
+            end = solve(f.problem, f.minimum.x, f.box, stage)
+            found[i] = replace(f, minimum=end, passes=f.passes + int(end.steps) + 1, exact=True)
+            again = True
+    return found, judged(found) if again else judgement
 
 
 def evaluate(
@@ -230,7 +238,7 @@ def _search(
 ) -> list[Found]:
     """Best optimum of the whole problem, or of each channel where nothing ties the channels together."""
     channels = blocks.channels
-    apart = loss.separable and not forms[0].shared and channels > 1
+    apart = loss.separable and len(forms) == 1 and not forms[0].shared and channels > 1
     found = []
     for part in [[c] for c in range(channels)] if apart else [list(range(channels))]:
         cells = blocks.channel(part[0]) if apart else blocks
@@ -241,14 +249,14 @@ def _search(
             begin = [
                 chart.coordinates_of({n: v if v.ndim == 0 else v[part] for n, v in p.items()}, len(part)) for p in proposals
             ]
-            box = Box(jnp.asarray(lower), jnp.asarray(upper), jnp.asarray(free))
+            box = Box(lower, upper, np.asarray(free))
             if fixed:  # a held parameter may lie outside the box that a fit searches
                 held = ~np.asarray(free)
                 exact = np.array([_unclipped(chart, p, part) for p in proposals])
                 begin = [np.where(held, e, b) for e, b in zip(exact, begin, strict=True)]
                 box = Box(
-                    jnp.where(held, jnp.minimum(box.lower, begin[0]), box.lower),
-                    jnp.where(held, jnp.maximum(box.upper, begin[0]), box.upper),
+                    np.where(held, np.minimum(lower, begin[0]), lower),
+                    np.where(held, np.maximum(upper, begin[0]), upper),
                     box.free,
                 )
             begin = [x for i, x in enumerate(begin) if not any(np.array_equal(x, y) for y in begin[:i])]

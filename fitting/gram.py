@@ -11,7 +11,8 @@ from __future__ import annotations
 
 from collections.abc import Callable
 from dataclasses import replace
-from typing import Any
+from functools import partial
+from typing import Any, NamedTuple
 
 import equinox as eqx
 import jax
@@ -54,24 +55,22 @@ class Problem(eqx.Module):
         return self.channels * len(self.chart.channel) + len(self.chart.shared)
 
 
-def _columns(function: Callable[[list[Array]], Array], x: list[Array]) -> tuple[list[Array], Array]:
-    """Columns of the Jacobian, one forward derivative each, and the value.
+def _columns(function: Callable[[list[Array]], tuple[Array, Array]], x: list[Array]) -> tuple[list[Array], Array, Array]:
+    """Columns of the Jacobian of the first value, one forward derivative each, and both values.
 
     Coordinates are separate scalars and each derivative is taken with the others held, so that what a coordinate does not
     touch is absent from its program, and what channels share is computed once for all of them. The compiler finds the
-    copies of the value equal.
+    copies of the values equal.
     """
     columns = []
-    traced: Any = jax.jit(function)  # the model is traced once; derivatives are taken of what was traced
     for k in range(len(x)):
 
-        def along(t: Array, k: int = k) -> Any:
-            return traced([*x[:k], t, *x[k + 1 :]])
+        def along(t: Array, k: int = k) -> tuple[Array, Array]:
+            return function([*x[:k], t, *x[k + 1 :]])
 
-        _, tangent = jax.jvp(along, (x[k],), (jnp.ones_like(x[k]),))
+        _, (tangent, _) = jax.jvp(along, (x[k],), (jnp.ones_like(x[k]),))
         columns.append(tangent)
-    value: Array = traced(x)
-    return columns, value
+    return columns, *function(x)
 
 
 def _root_weight(loss: Loss, g: Geometry, weight: Array) -> Array:
@@ -105,10 +104,9 @@ def _bending(chart: Chart, own: list[Array], shared: list[Array]) -> list[Array]
     return [v for c, v in pairs if not c.linear]
 
 
-def _tables(problem: Problem, own: list[Array], shared: list[Array]) -> _Tables:
+@partial(jax.jit, static_argnums=0)
+def _tables(chart: Chart, own: list[Array], shared: list[Array], g: Geometry) -> _Tables:
     """Polar functions of one channel's model."""
-    chart = problem.chart
-    g, _, _ = problem.samples.block(jnp.zeros((), int))
     bent = _bending(chart, own, shared)
 
     def make(y: list[Array]) -> list[Array]:
@@ -136,56 +134,74 @@ def polar_tables(problem: Problem, x: Vector) -> _Tables:
     of all of them at once if they share theirs.
     """
     own, shared = problem.chart.split(x, problem.channels)
+    g, _, _ = problem.samples.block(jnp.zeros((), int))
     if problem.own_lobes:
-        return jax.vmap(lambda o: _tables(problem, list(o), list(shared)))(own)
-    return _tables(problem, list(own[0]), list(shared))
+        return jax.vmap(lambda o: _tables(problem.chart, list(o), list(shared), g))(own)
+    return _tables(problem.chart, list(own[0]), list(shared), g)
+
+
+# A function compiled within a program is traced once for all places, programs and derivatives that use it, as long as it
+# closes over nothing that is itself being traced.
+
+
+@partial(jax.jit, static_argnums=0)
+def _values(chart: Chart, own: list[Array], shared: list[Array], tables: _Tables, g: Geometry) -> Array:
+    """BRDF values of one channel."""
+    at = replace(g, tables=tables.near(_bending(chart, own, shared)))
+    return jnp.broadcast_to(chart.model(own, shared).evaluate(at), g.shape)
+
+
+@partial(jax.jit, static_argnums=0)
+def _channel_residual(
+    chart: Chart, y: list[Array], tables: _Tables, measured: Array, g: Geometry, loss: Loss, root: Array
+) -> tuple[Array, Array]:
+    """Weighted residual and BRDF values of one channel."""
+    k = len(chart.channel)
+    f = _values(chart, y[:k], y[k:], tables, g)
+    return root * loss(f[..., None], measured[..., None], g)[..., 0], f
+
+
+@partial(jax.jit, static_argnums=0)
+def _joint_residual(
+    form: tuple[Chart, int], y: list[Array], tables: _Tables, measured: Array, g: Geometry, loss: Loss, root: Array
+) -> tuple[Array, Array]:
+    """Weighted residuals ``[m, *cells]`` and BRDF values ``[C, *cells]`` of all channels."""
+    chart, channels = form
+    own, shared = chart.split(jnp.stack(y), channels)
+    own_lobes = any(not c.linear for c in chart.channel)
+    each = jax.vmap(lambda o, t: _values(chart, list(o), list(shared), t, g), in_axes=(0, 0 if own_lobes else None))
+    f = each(own, tables)
+    flat_f, flat_m = (jnp.moveaxis(v, 0, -1).reshape(-1, channels) for v in (f, measured))
+    r = jnp.asarray(loss(flat_f, flat_m, g.flat())).reshape(root.size, -1)
+    return jnp.moveaxis(root.reshape(-1, 1) * r, -1, 0).reshape(-1, *root.shape), f
 
 
 def channel_rows(
     problem: Problem, x: Vector, tables: _Tables, g: Geometry, measured: Array, weight: Array
-) -> Float[Array, "C k+s+1 *cells"]:
-    """Weighted rows [J r] of a block, channel by channel, for a loss that treats channels separately."""
+) -> tuple[Float[Array, "C k+s+1 *cells"], Float[Array, "C *cells"]]:
+    """Weighted rows [J r] of a block, channel by channel, for a loss that treats channels separately; and the values."""
     chart, loss = problem.chart, problem.loss
     own, shared = chart.split(x, problem.channels)
     root = _root_weight(loss, g, weight)
-    k = len(chart.channel)
 
-    def one(own_c: Vector, tables_c: _Tables, measured_c: Array) -> Array:
-        def residual(y: list[Array]) -> Array:
-            at = replace(g, tables=tables_c.near(_bending(chart, y[:k], y[k:])))
-            f = jnp.broadcast_to(chart.model(y[:k], y[k:]).evaluate(at), measured_c.shape)
-            return root * loss(f[..., None], measured_c[..., None], g)[..., 0]
+    def one(own_c: Vector, tables_c: _Tables, measured_c: Array) -> tuple[Array, Array]:
+        columns, r, f = _columns(
+            lambda y: _channel_residual(chart, y, tables_c, measured_c, g, loss, root), [*own_c, *shared]
+        )
+        return jnp.stack([*(jnp.broadcast_to(c, r.shape) for c in columns), r]), f
 
-        columns, value = _columns(residual, [*own_c, *shared])
-        return jnp.stack([*(jnp.broadcast_to(c, value.shape) for c in columns), value])
-
-    return jax.vmap(one, in_axes=(0, 0 if problem.own_lobes else None, 0))(own, tables, measured)
+    rows: tuple[Array, Array] = jax.vmap(one, in_axes=(0, 0 if problem.own_lobes else None, 0))(own, tables, measured)
+    return rows
 
 
 def joint_rows(
     problem: Problem, x: Vector, tables: _Tables, g: Geometry, measured: Array, weight: Array
-) -> Float[Array, "n+1 m *cells"]:
-    """Weighted rows [J r] of a block for a loss of any form, m residuals a cell."""
-    chart, loss = problem.chart, problem.loss
-    cells = weight.shape
-    flat = g.flat()
-    root = _root_weight(loss, flat, weight.reshape(-1))
-    m = jnp.moveaxis(measured, 0, -1).reshape(-1, problem.channels)
-
-    def residual(y: list[Array]) -> Array:
-        own, shared = chart.split(jnp.stack(y), problem.channels)
-
-        def one(own_c: Vector, tables_c: _Tables) -> Array:
-            at = replace(g, tables=tables_c.near(_bending(chart, list(own_c), list(shared))))
-            return jnp.broadcast_to(chart.model(own_c, shared).evaluate(at), cells)
-
-        f = jax.vmap(one, in_axes=(0, 0 if problem.own_lobes else None), out_axes=-1)(own, tables)
-        r = loss(f.reshape(-1, problem.channels), m, flat)
-        r = jnp.asarray(r).reshape(root.size, -1)
-        return jnp.moveaxis(root[:, None] * r, -1, 0).reshape(-1, *cells)
-
-    columns, value = _columns(residual, list(x))
-    return jnp.stack([*columns, value])
+) -> tuple[Float[Array, "n+1 m *cells"], Float[Array, "C *cells"]]:
+    """Weighted rows [J r] of a block for a loss of any form, m residuals a cell; and the values."""
+    root = _root_weight(problem.loss, g, weight)
+    form = problem.chart, problem.channels
+    columns, r, f = _columns(lambda y: _joint_residual(form, y, tables, measured, g, problem.loss, root), list(x))
+    return jnp.stack([*columns, r]), f
 
 
 def _products(rows: Float[Array, "m *cells"]) -> Float[Array, "m m"]:
@@ -223,12 +239,12 @@ class Span(eqx.Module):
     @staticmethod
     def cells(samples: Samples, count: int | None = None) -> Span:
         """The first ``count`` blocks of cells; all of them by default."""
-        return Span(jnp.asarray(samples.compressed), jnp.asarray(min(count or samples.blocks, samples.blocks)))
+        return Span(np.asarray(samples.compressed), np.asarray(min(count or samples.blocks, samples.blocks)))
 
     @staticmethod
     def nodes(samples: Samples, count: int | None = None) -> Span:
         """The first ``count`` compressed blocks; all of them by default."""
-        return Span(jnp.asarray(0), jnp.asarray(min(count or samples.compressed, samples.compressed)))
+        return Span(np.asarray(0), np.asarray(min(count or samples.compressed, samples.compressed)))
 
 
 def _sum_over_blocks(samples: Samples, span: Span, one: Callable[[Geometry, Array, Array], Any]) -> Any:
@@ -251,8 +267,8 @@ def gram(problem: Problem, x: Vector, span: Span) -> Float[Array, "n+1 n+1"]:
 
     def one(g: Geometry, measured: Array, weight: Array) -> Array:
         if problem.loss.separable:
-            return jax.vmap(_products)(channel_rows(problem, x, tables, g, measured, weight))
-        return _products(joint_rows(problem, x, tables, g, measured, weight))
+            return jax.vmap(_products)(channel_rows(problem, x, tables, g, measured, weight)[0])
+        return _products(joint_rows(problem, x, tables, g, measured, weight)[0])
 
     total: Array = _sum_over_blocks(problem.samples, span, one)
     if problem.loss.separable:
@@ -263,27 +279,38 @@ def gram(problem: Problem, x: Vector, span: Span) -> Float[Array, "n+1 n+1"]:
     return total
 
 
-def statistics(problem: Problem, x: Vector) -> tuple[Float[Array, "... n+1 n+1"], Float[Array, "n n"]]:
-    """What error bars are made of: G of each angular band, and the sum over cells of s s^T.
+class Statistics(NamedTuple):
+    """What one pass over all cells at an optimum tells."""
 
-    s = sum_c w r J is the gradient of a cell (the middle of the sandwich, White 1980, eq. 3). The channels of a cell are
-    summed first, so that noise which they share is counted.
-    """
+    bands: Float[Array, "... n+1 n+1"]
+    """G of each angular band."""
+    middle: Float[Array, "n n"]
+    """Sum over cells of s s^T, s = sum_c w r J the gradient of a cell: the middle of the sandwich (White 1980, eq. 3). The
+    channels of a cell are summed first, so that noise which they share is counted."""
+    errors: Float[Array, "losses"]
+    """sqrt(sum w r^2 / sum w) of each loss asked for."""
+
+
+def statistics(problem: Problem, x: Vector, losses: tuple[Loss, ...] = ()) -> Statistics:
+    """What error bars are made of, and the error under each loss, over all cells and channels."""
     n, k, c = problem.size, len(problem.chart.channel), problem.channels
     tables = polar_tables(problem, x)
 
-    def one(g: Geometry, measured: Array, weight: Array) -> tuple[Array, Array]:
+    def one(g: Geometry, measured: Array, weight: Array) -> tuple[Array, Array, Array]:
         if problem.loss.separable:
-            rows = channel_rows(problem, x, tables, g, measured, weight)
+            rows, f = channel_rows(problem, x, tables, g, measured, weight)
             s = (rows[:, :-1] * rows[:, -1:]).reshape(c, rows.shape[1] - 1, -1)
             s = jnp.concatenate([s[:, :k].reshape(c * k, -1), jnp.sum(s[:, k:], 0)])
-            return jax.vmap(lambda r: _band_products(r, problem.samples))(rows), s @ s.T
-        rows = joint_rows(problem, x, tables, g, measured, weight)
-        s = jnp.sum(rows[:-1] * rows[-1:], 1).reshape(n, -1)
-        return jnp.sum(jax.vmap(lambda r: _band_products(r, problem.samples), in_axes=1)(rows), 0), s @ s.T
+            bands = jax.vmap(lambda r: _band_products(r, problem.samples))(rows)
+        else:
+            rows, f = joint_rows(problem, x, tables, g, measured, weight)
+            s = jnp.sum(rows[:-1] * rows[-1:], 1).reshape(n, -1)
+            bands = jnp.sum(jax.vmap(lambda r: _band_products(r, problem.samples), in_axes=1)(rows), 0)
+        return bands, s @ s.T, _loss_sums(losses, f, measured, weight, g)
 
-    grams, middle = _sum_over_blocks(problem.samples, Span.cells(problem.samples), one)
-    return (_scatter(problem, grams) if problem.loss.separable else grams), middle
+    bands, middle, sums = _sum_over_blocks(problem.samples, Span.cells(problem.samples), one)
+    bands = _scatter(problem, bands) if problem.loss.separable else bands
+    return Statistics(bands, middle, jnp.sqrt(sums[:, 0] / sums[:, 1]))
 
 
 def factor(g: Float[Array, "m m"]) -> Float[Array, "m m"]:
@@ -305,9 +332,11 @@ def gram_residual(problem: Problem, span: Span) -> Callable[[Vector], Array]:
     A trial point where the residual is not a number (1 + f cos <= 0 under ``log``) has infinite cost: it is rejected, and
     the factors of a finite matrix are returned in its place so that no NaN reaches the solver.
     """
+    # traced here, once: inside a solver every use of it would be
+    one_pass = eqx.filter_closure_convert(lambda x: gram(problem, x, span), jax.ShapeDtypeStruct((problem.size,), float))
 
     def whiten(x: Vector) -> Array:
-        g = gram(problem, x, span)
+        g = one_pass(x)
         ok = jnp.all(jnp.isfinite(g))
         g = jnp.where(ok, g, jnp.eye(g.shape[0]))
         return jnp.where(ok, 1.0, 1e150) * factor(g)
@@ -324,22 +353,29 @@ def gram_residual(problem: Problem, span: Span) -> Callable[[Vector], Array]:
     return residual
 
 
+def _loss_sums(
+    losses: tuple[Loss, ...], f: Float[Array, "C *cells"], measured: Float[Array, "C *cells"], weight: Array, g: Geometry
+) -> Float[Array, "losses 2"]:
+    """sum w r^2 and sum w of each loss over a block."""
+    out = [jnp.zeros((0, 2))]
+    for loss in losses:
+        relative = loss.weight(g)
+        w = jnp.broadcast_to(weight if relative is None else weight * relative, weight.shape).reshape(-1, 1)
+        values = [jnp.moveaxis(v, 0, -1) for v in (f, measured)]
+        if loss.separable:
+            r = loss(*values, g).reshape(w.size, -1)
+        else:
+            r = jnp.asarray(loss(*(v.reshape(w.size, -1) for v in values), g.flat())).reshape(w.size, -1)
+        out.append(jnp.stack([jnp.sum(w * r**2), jnp.sum(w) * r.shape[-1]])[None])
+    return jnp.concatenate(out)
+
+
 def loss_errors(model: Any, samples: Samples, losses: tuple[Loss, ...]) -> Float[Array, "losses"]:
     """sqrt(sum w r^2 / sum w) of each loss over all fitted cells and channels."""
 
     def one(g: Geometry, measured: Array, weight: Array) -> Array:
-        f = evaluate_channels(model, g)
-        m = jnp.moveaxis(measured, 0, -1)
-        out = []
-        for loss in losses:
-            relative = loss.weight(g)
-            w = jnp.broadcast_to(weight if relative is None else weight * relative, weight.shape).reshape(-1, 1)
-            if loss.separable:
-                r = loss(f, m, g).reshape(w.size, -1)
-            else:
-                r = jnp.asarray(loss(f.reshape(-1, f.shape[-1]), m.reshape(-1, f.shape[-1]), g.flat())).reshape(w.size, -1)
-            out.append(jnp.stack([jnp.sum(w * r**2), jnp.sum(w) * r.shape[-1]]))
-        return jnp.stack(out)
+        f = jnp.moveaxis(evaluate_channels(model, g), -1, 0)
+        return _loss_sums(losses, jnp.broadcast_to(f, measured.shape), measured, weight, g)
 
     sums = _sum_over_blocks(samples, Span.cells(samples), one)
     return jnp.sqrt(sums[:, 0] / sums[:, 1])

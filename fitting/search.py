@@ -7,11 +7,11 @@ from dataclasses import dataclass
 from typing import NamedTuple
 
 import equinox as eqx
-import jax.numpy as jnp
 import numpy as np
 from jaxtyping import Array
 from numpy.typing import NDArray
 
+from ..programs import program
 from .gram import Problem, Span, gram_residual
 from .result import Optimum
 from .solver import Box, Minimum, minimise
@@ -41,10 +41,10 @@ class Stage(eqx.Module):
     @staticmethod
     def of(span: Span, rtol: float, damping: float) -> Stage:
         """A stage, its numbers as arguments of the compiled program."""
-        return Stage(span, jnp.asarray(rtol), jnp.asarray(damping))
+        return Stage(span, np.asarray(rtol), np.asarray(damping))
 
 
-@eqx.filter_jit
+@program
 def solve(problem: Problem, x: Array, box: Box, stage: Stage) -> Minimum:
     """Minimise from x. One program for coarse and whole tables and for any bounds."""
     return minimise(gram_residual(problem, stage.span), x, box, stage.rtol, stage.damping, MAX_STEPS)
@@ -118,9 +118,9 @@ def _polished(
     problem: Problem, box: Box, starts: list[NDArray[np.float64]], colour: Stage, coarse: Stage
 ) -> Iterator[Candidate]:
     """The best starts after a refit of the linear coordinates, polished; of doubles only one."""
-    linear = jnp.asarray([c.linear for c, _ in problem.chart.vector(problem.channels)])
+    linear = np.asarray([c.linear for c, _ in problem.chart.vector(problem.channels)])
     colours = Box(box.lower, box.upper, box.free & linear)
-    ranked = sorted((_candidate(problem, box, solve(problem, jnp.asarray(x), colours, colour)) for x in starts), key=_cost)
+    ranked = sorted((_candidate(problem, box, solve(problem, x, colours, colour)) for x in starts), key=_cost)
     kept: list[Candidate] = []
     for c in ranked:
         if len(kept) < POLISHED and not (kept and c.cost <= kept[-1].cost * (1 + 1e-9)):

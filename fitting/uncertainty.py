@@ -28,8 +28,8 @@ class Uncertainty:
     jackknife: Reals
     undetermined: NDArray[np.bool_]
     """Coordinates that the data do not determine."""
-    shift: float
-    """Largest coordinate of the Gauss-Newton step from here, in standard errors."""
+    shift: Reals
+    """The Gauss-Newton step from here, in standard errors; 0 for what cannot move."""
 
 
 def uncertainty(bands: Reals, middle: Reals, moving: NDArray[np.bool_]) -> Uncertainty:
@@ -37,12 +37,12 @@ def uncertainty(bands: Reals, middle: Reals, moving: NDArray[np.bool_]) -> Uncer
     n = middle.shape[0]
     total = bands.sum(0)
     undetermined = np.zeros(n, bool)
-    statistical, jackknife = np.zeros((n, n)), np.zeros((n, n))
+    statistical, jackknife, shift = np.zeros((n, n)), np.zeros((n, n)), np.zeros(n)
     moving = moving & np.isfinite(total).all(0)[:n]
     undetermined |= moving & ~(np.diag(total)[:n] > 0)
     at = np.flatnonzero(moving & ~undetermined)
     if not len(at):
-        return Uncertainty(statistical, jackknife, undetermined, 0.0)
+        return Uncertainty(statistical, jackknife, undetermined, shift)
     inverse, null = _pseudo_inverse(total[np.ix_(at, at)])
     undetermined[at] = null
     statistical[np.ix_(at, at)] = inverse @ middle[np.ix_(at, at)] @ inverse
@@ -54,7 +54,7 @@ def uncertainty(bands: Reals, middle: Reals, moving: NDArray[np.bool_]) -> Uncer
     errors = np.sqrt(np.diag(statistical)[at])
     step = np.abs(_delete(total, at))
     with np.errstate(divide="ignore", invalid="ignore"):
-        shift = float(np.max(np.where(step > 0, step / errors, 0.0)))
+        shift[at] = np.where(step > 0, step / errors, 0.0)
     return Uncertainty(statistical, jackknife, undetermined, shift)
 
 

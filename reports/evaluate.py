@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from functools import cache
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
@@ -35,17 +36,14 @@ def evaluate(model: BRDF | None, wi: Reals, wo: Reals, count: int) -> Reals:
     return np.broadcast_to(out.reshape(n, -1)[: len(wi)], (len(wi), count))
 
 
-_compiled: list[Any] = []
-
-
+@cache
 def _program() -> Any:
     """The one compiled function, made on first use so that rebuilding a report does not import JAX for it."""
-    if not _compiled:
-        import equinox as eqx
-        import jax
+    import jax
 
-        def run(model: BRDF, wi: Any, wo: Any) -> Any:
-            return jax.lax.map(lambda pair: model(*pair), (wi, wo))
+    from ..programs import program
 
-        _compiled.append(eqx.filter_jit(run))
-    return _compiled[0]
+    def run(model: BRDF, wi: Any, wo: Any) -> Any:
+        return jax.lax.map(lambda pair: model(*pair), (wi, wo))
+
+    return program(run)

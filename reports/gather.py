@@ -46,42 +46,60 @@ def fit_key(fit: Fit) -> str:
     return f"{fit.model_name}/{fit.loss}/{fit.measure}/{fit.angles}/{digest.hexdigest()[:12]}"
 
 
+class Views:
+    """The directions in which a report shows a table, and what fits have there.
+
+    Call it with a fit as soon as there is one, while others are being made; :meth:`evidence` then finds it done.
+    """
+
+    def __init__(self, table: Table, max_angle: float = 80.0) -> None:
+        self.table = table
+        self._missing: dict[str, str] = {}
+        self._lobe_at = _lobe_directions(table, self._missing)
+        self._sphere_at = _sphere_directions()
+        self._albedo_at = albedo_directions()
+        self._cells_at = _cells(table, max_angle)
+        lobes = self._lobe_at[1:3] if self._lobe_at else (np.zeros((0, 3)),) * 2
+        pieces = [lobes, self._sphere_at[1:3], self._albedo_at[:2], self._cells_at[:2]]
+        self._ends = np.cumsum([len(p[0]) for p in pieces])
+        self._wi, self._wo = (np.concatenate([p[k] for p in pieces]) for k in (0, 1))
+        self._values: dict[str, Reals] = {}
+
+    def __call__(self, fit: Fit) -> Reals:
+        """Values ``[n, C]`` of a fit in all directions, NaN without a model."""
+        key = fit_key(fit)
+        if key not in self._values:
+            self._values[key] = evaluate(fit.model, self._wi, self._wo, self.table.channels)
+        return self._values[key]
+
+    def evidence(self, fits: Sequence[Fit]) -> Evidence:
+        """What the plots need of the table and these fits (those without a model keep their place, as NaN)."""
+        table, missing = self.table, dict(self._missing)
+        values = np.stack([self(f) for f in fits]) if fits else np.zeros((0, len(self._wi), table.channels))
+        at_lobes, at_sphere, at_albedo, at_cells = np.split(values, self._ends[:-1], axis=1)
+        lobes = None
+        if self._lobe_at:
+            angles, _, _, measured, how = self._lobe_at
+            shape = (len(angles[0]), -1, table.channels)
+            fitted = at_lobes.reshape(len(fits), *angles[1].shape, table.channels)
+            lobes = Lobes(angles[0], angles[1], measured.reshape(shape), fitted, how)
+        return Evidence(
+            material=table.material,
+            source=table.source,
+            sha256=table.sha256,
+            keys=tuple(fit_key(f) for f in fits),
+            channel_names=channel_names(table),
+            lobes=lobes,
+            maps=_maps(at_cells, self._cells_at),
+            sphere=_sphere(table, self._sphere_at, at_sphere, missing),
+            albedo=_albedo(table, self._albedo_at, at_albedo),
+            missing=missing,
+        )
+
+
 def gather(table: Table, fits: Sequence[Fit]) -> Evidence:
-    """What the plots need of one table and its fits (those without a model keep their place, as NaN)."""
-    missing: dict[str, str] = {}
-    lobe_at = _lobe_directions(table, missing)
-    sphere_at = _sphere_directions()
-    albedo_at = albedo_directions()
-    cells_at = _cells(table, min((f.max_angle for f in fits), default=80.0))
-
-    pieces = [lobe_at[1:3] if lobe_at else None, sphere_at[1:3], albedo_at[:2], cells_at[:2]]
-    sizes = [0 if p is None else p[0].shape[0] for p in pieces]
-    wi, wo = (np.concatenate([p[k] for p in pieces if p is not None]) for k in (0, 1))
-    values = (
-        np.stack([evaluate(f.model, wi, wo, table.channels) for f in fits])
-        if fits
-        else np.zeros((0, len(wi), table.channels))
-    )
-    at_lobes, at_sphere, at_albedo, at_cells = np.split(values, np.cumsum(sizes)[:-1], axis=1)
-
-    lobes = None
-    if lobe_at:
-        angles, _, _, measured, how = lobe_at
-        shape = (len(angles[0]), -1, table.channels)
-        fitted = at_lobes.reshape(len(fits), *angles[1].shape, table.channels)
-        lobes = Lobes(angles[0], angles[1], measured.reshape(shape), fitted, how)
-    return Evidence(
-        material=table.material,
-        source=table.source,
-        sha256=table.sha256,
-        keys=tuple(fit_key(f) for f in fits),
-        channel_names=channel_names(table),
-        lobes=lobes,
-        maps=_maps(at_cells, cells_at),
-        sphere=_sphere(table, sphere_at, at_sphere, missing),
-        albedo=_albedo(table, albedo_at, at_albedo),
-        missing=missing,
-    )
+    """What the plots need of one table and its fits."""
+    return Views(table, min((f.max_angle for f in fits), default=80.0)).evidence(fits)
 
 
 def interpolate(table: Table, wi: Reals, wo: Reals) -> Reals:
@@ -296,4 +314,4 @@ def _maps(fitted: Reals, cells: tuple[Reals, Reals, Reals, NDArray[np.bool_], ND
     return Maps(edges_h, edges_d, np.stack(signed) if signed else empty, np.stack(rms) if rms else empty, how)
 
 
-__all__ = ["fit_key", "gather", "interpolate"]
+__all__ = ["Views", "fit_key", "gather", "interpolate"]

@@ -6,7 +6,6 @@ from collections.abc import Callable, Sequence
 from dataclasses import replace
 from zlib import crc32
 
-import equinox as eqx
 import jax
 import jax.numpy as jnp
 import numpy as np
@@ -17,6 +16,7 @@ from ...errors import InputError
 from ...geometry import Geometry, from_directions
 from ...models import parameter_values
 from ...models.base import BRDF, channels, evaluate_channels
+from ...programs import program
 from ...tables.layout import HalfDifferenceGrid, Layout, Scattered, SphericalGrid
 from ...tables.merl import Angles
 from ...tables.table import Table, table
@@ -112,7 +112,7 @@ def evaluate(brdf: BRDF, layout: Layout) -> tuple[NDArray[np.float64], NDArray[n
     return np.where(lower > HORIZON, lower, np.nan).reshape(layout.shape), planes.reshape(-1, *layout.shape)
 
 
-@eqx.filter_jit
+@program
 def _evaluate(brdf: BRDF, g: Geometry) -> Array:
     return evaluate_channels(brdf, g, out_axis=0)
 

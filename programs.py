@@ -1,0 +1,50 @@
+"""How this package compiles: with the compiler's settings that pay for programs that run for a second or two."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from functools import cache, wraps
+from threading import Lock
+from typing import Any, ParamSpec, TypeVar
+
+import equinox as eqx
+import jax
+
+P = ParamSpec("P")
+R = TypeVar("R")
+
+OPTIONS = {"xla_cpu_use_fusion_emitters": False}
+"""XLA's newer way of generating loops takes 2.5 times as long to compile a fit as the older one, and the program is no
+faster for it (benchmarks/cold_start.py)."""
+
+_making = Lock()
+
+
+def program(function: Callable[P, R]) -> Callable[P, R]:
+    """Compile a function for the shapes of its arrays; all else is static. For calls from Python, not from a program."""
+
+    @cache
+    def compiled() -> Any:
+        return eqx.filter_jit(function, compiler_options=_understood())
+
+    @wraps(function)
+    def call(*args: P.args, **kwargs: P.kwargs) -> R:
+        with _making:  # two threads that ask at once get the same one
+            it = compiled()
+        result: R = it(*args, **kwargs)
+        return result
+
+    return call
+
+
+@cache
+def _understood() -> dict[str, bool]:
+    """The options, or none: a compiler that does not know one of them refuses every program."""
+    try:
+        jax.jit(lambda: 0, compiler_options=OPTIONS)()
+    except jax.errors.JaxRuntimeError:
+        return {}
+    return OPTIONS
+
+
+__all__ = ["program"]
