@@ -25,6 +25,7 @@ __version__ = "0.1.0"
 # file do not wait for JAX.
 _PUBLIC = {
     "BRDF": "models",
+    "Effort": "fitting",
     "Fit": "fitting",
     "Geometry": "geometry",
     "InputError": "errors",

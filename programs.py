@@ -25,7 +25,8 @@ def program(function: Callable[P, R]) -> Callable[P, R]:
 
     @cache
     def compiled() -> Any:
-        return eqx.filter_jit(function, compiler_options=_understood())
+        compiler: Any = eqx.filter_jit  # passes on what it does not know
+        return compiler(function, compiler_options=_understood())
 
     @wraps(function)
     def call(*args: P.args, **kwargs: P.kwargs) -> R:

@@ -11,6 +11,7 @@ from typing import Any
 from ..errors import InputError
 from ..files import StrPath
 from ..tables import Table, load
+from .effort import DEFAULT
 from .fit_table import Model, failed, fit, model_class, prepare
 from .losses import named_loss
 from .result import Fit
@@ -55,6 +56,7 @@ def _results(
                     options.get("max_angle", 80.0),
                     options.get("measure", "solid_angle"),
                     named_loss(options.get("loss", "log")),
+                    options.get("effort", DEFAULT),
                 )
             except InputError as fault:
                 for m in models:

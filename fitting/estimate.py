@@ -3,10 +3,11 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
+from typing import Any
 
 import jax
 import numpy as np
-from jaxtyping import Array
+from jaxtyping import Array, Float
 from numpy.typing import NDArray
 
 from ..models import parameters_of
@@ -24,7 +25,7 @@ _statistics = program(statistics)
 
 
 @program
-def _parameters(chart: Chart, x: Array, channels: int) -> tuple[dict[str, Array], dict[str, Array]]:
+def _parameters(chart: Chart, x: Float[Any, "n"], channels: int) -> tuple[dict[str, Array], dict[str, Array]]:
     """Parameters ``[C]`` of a vector of coordinates, and their derivatives ``[C, n]``."""
 
     def values(y: Array) -> dict[str, Array]:
@@ -82,12 +83,14 @@ def judge(problem: Problem, x: Reals, box: Box, losses: tuple[Loss, ...]) -> Jud
         return {name: size[i].reshape(parameters[name].shape) for name, i in at.items()}
 
     def between(a: str, b: str) -> Reals:
-        return statistical[np.ix_(at[a], at[b])].reshape(parameters[a].shape + parameters[b].shape)
+        block: Reals = statistical[np.ix_(at[a], at[b])].reshape(parameters[a].shape + parameters[b].shape)
+        return block
 
     scale = np.sqrt(np.diag(statistical))
     scale = np.where((scale > 0) & ~unknown, scale, np.nan)
     labels = tuple(_label(r) for r in rows)
-    bounded = [(c.parameter, k) for i, (c, k) in enumerate(chart.vector(channels)) if free[i] and (at_lower[i] or at_upper[i])]
+    ends = free & (at_lower | at_upper)
+    bounded = [(c.parameter, k) for (c, k), end in zip(chart.vector(channels), ends, strict=True) if end]
     estimate = Estimate(
         parameters,
         deviation(statistical),

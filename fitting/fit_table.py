@@ -18,6 +18,7 @@ from ..models import BRDF, channels, parameter_values, parameters_of, variants
 from ..programs import program
 from ..tables import Table
 from .coordinates import Chart, charts
+from .effort import DEFAULT, Effort
 from .estimate import Judgement, judge
 from .gram import Problem, Span, loss_errors
 from .losses import LOSSES, Loss, LossFunction, named_loss
@@ -59,16 +60,24 @@ _prepared: WeakKeyDictionary[Table, dict[Any, Prepared]] = WeakKeyDictionary()
 _preparing = threading.Lock()
 
 
-def prepare(table: Table, max_angle: float = 80.0, measure: str = "solid_angle", loss: Loss = LOSSES["log"]) -> Prepared:
+def prepare(
+    table: Table,
+    max_angle: float = 80.0,
+    measure: str = "solid_angle",
+    loss: Loss = LOSSES["log"],
+    effort: Effort = DEFAULT,
+) -> Prepared:
     """Blocks, fitted cells and summary of a table, kept for the next model fitted to it."""
-    key = (max_angle, measure, loss)
+    compressed = effort.path != "exact"
+    key = (max_angle, measure, loss, effort.nodes, compressed)
     with jax.enable_x64(True), _preparing:
         kept = _prepared.setdefault(table, {})
         if key not in kept:
-            cells, used = samples(table, max_angle, measure)
+            cells, used = samples(table, max_angle, measure, effort.nodes)
             bound = loss.bind(table.planes[:, used])
             kept.clear()
-            kept[key] = Prepared(compress(cells, table, used, max_angle, bound), used, summarise(table, used), bound)
+            both = compress(cells, table, used, max_angle, bound) if compressed else cells
+            kept[key] = Prepared(both, used, summarise(table, used), bound)
         return kept[key]
 
 
@@ -98,6 +107,7 @@ def fit(
     start: Mapping[str, ArrayLike] | None = None,
     anisotropic: bool | None = None,
     seed: int = 0,
+    effort: Effort = DEFAULT,
 ) -> Fit:
     """Fit one model to all cells of one table, in float64.
 
@@ -113,6 +123,7 @@ def fit(
         start: Parameters of one more start; those left out take their defaults.
         anisotropic: Whether to fit the anisotropic form of a named model; by default if the table is anisotropic.
         seed: Seed of the starts of models that have no shapes of their own to start from.
+        effort: Settings that trade time for accuracy.
 
     Returns:
         A :class:`Fit`. A fit that failed is a result with ``converged`` False and the ``reason`` in words.
@@ -129,7 +140,7 @@ def fit(
     _check_bounds(cls, bounds or {})
     begin = time.perf_counter()
     with jax.enable_x64(True), compilation() as compiled:
-        ready = prepare(table, max_angle, measure, named_loss(loss))
+        ready = prepare(table, max_angle, measure, named_loss(loss), effort)
         used, bound_loss = ready.used, ready.loss
         prepared = time.perf_counter()
         frame: dict[str, Any] = {
@@ -156,8 +167,8 @@ def fit(
             proposals.insert(0, {**proposals[0], **_per_channel(cls, given, table.channels)})
         proposals = [{**p, **_per_channel(cls, held, table.channels)} for p in proposals]
         named = _named_losses(table.planes[:, used], bound_loss)
-        found = _search(forms, ready.samples, bound_loss, proposals, frozenset(held))
-        found, judged = settle(found, Problem(ready.samples, bound_loss, found[0].problem.chart), named)
+        found = _search(forms, ready.samples, bound_loss, proposals, frozenset(held), effort)
+        found, judged = settle(found, Problem(ready.samples, bound_loss, found[0].problem.chart), named, effort)
         errors = judged.errors
     converged, reason = _verdict(found)
     solve = time.perf_counter() - prepared - compiled.seconds
@@ -179,14 +190,16 @@ def fit(
         passes=max(f.passes for f in found),
         path="exact" if any(f.exact for f in found) else "compressed",
         shift=float(judged.shift.max(initial=0.0)),
+        effort=effort,
     )
 
 
-def settle(found: list[Found], whole: Problem, losses: tuple[Loss, ...]) -> tuple[list[Found], Judgement]:
+def settle(found: list[Found], whole: Problem, losses: tuple[Loss, ...], effort: Effort) -> tuple[list[Found], Judgement]:
     """Optima, of all channels or of each, judged by the whole table.
 
     An optimum of the compressed table stands if the cells themselves, asked with one exact Gauss-Newton step, would move
-    no parameter by more than :data:`TOLERATED` standard errors. Otherwise the search ends on the cells.
+    no parameter by more than :data:`TOLERATED` standard errors. Otherwise, if ``effort`` leaves it open, the search ends on
+    the cells.
     """
 
     def judged(found: list[Found]) -> Judgement:
@@ -200,8 +213,8 @@ def settle(found: list[Found], whole: Problem, losses: tuple[Loss, ...]) -> tupl
     again = False
     for i, shift in enumerate(np.split(judgement.shift, len(found))):
         f = found[i]
-        if not f.exact and shift.max(initial=0.0) > TOLERATED:
-            stage = Stage.of(Span.cells(f.problem.samples), 1e-9, 1e-6)
+        if effort.path == "auto" and not f.exact and shift.max(initial=0.0) > TOLERATED:
+            stage = Stage.of(Span.cells(f.problem.samples), effort.rtol, 1e-6)
             end = solve(f.problem, f.minimum.x, f.box, stage)
             found[i] = replace(f, minimum=end, passes=f.passes + int(end.steps) + 1, exact=True)
             again = True
@@ -234,7 +247,12 @@ def _named_losses(values: NDArray[np.float64], own: Loss | None) -> tuple[Loss, 
 
 
 def _search(
-    forms: tuple[Chart, ...], blocks: Samples, loss: Loss, proposals: list[Named], fixed: frozenset[str]
+    forms: tuple[Chart, ...],
+    blocks: Samples,
+    loss: Loss,
+    proposals: list[Named],
+    fixed: frozenset[str],
+    effort: Effort,
 ) -> list[Found]:
     """Best optimum of the whole problem, or of each channel where nothing ties the channels together."""
     channels = blocks.channels
@@ -261,7 +279,7 @@ def _search(
                 )
             begin = [x for i, x in enumerate(begin) if not any(np.array_equal(x, y) for y in begin[:i])]
             problems.append((Problem(cells, loss, chart), box, begin))
-        found.append(search(problems))
+        found.append(search(problems, effort))
     return found
 
 

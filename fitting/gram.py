@@ -18,7 +18,7 @@ import equinox as eqx
 import jax
 import jax.numpy as jnp
 import numpy as np
-from jaxtyping import Array, Float
+from jaxtyping import Array, Float, Int
 
 from ..geometry import Geometry
 from ..models import evaluate_channels
@@ -135,9 +135,12 @@ def polar_tables(problem: Problem, x: Vector) -> _Tables:
     """
     own, shared = problem.chart.split(x, problem.channels)
     g, _, _ = problem.samples.block(jnp.zeros((), int))
+    tables: _Tables
     if problem.own_lobes:
-        return jax.vmap(lambda o: _tables(problem.chart, list(o), list(shared), g))(own)
-    return _tables(problem.chart, list(own[0]), list(shared), g)
+        tables = jax.vmap(lambda o: _tables(problem.chart, list(o), list(shared), g))(own)
+    else:
+        tables = _tables(problem.chart, list(own[0]), list(shared), g)
+    return tables
 
 
 # A function compiled within a program is traced once for all places, programs and derivatives that use it, as long as it
@@ -169,7 +172,7 @@ def _joint_residual(
     chart, channels = form
     own, shared = chart.split(jnp.stack(y), channels)
     own_lobes = any(not c.linear for c in chart.channel)
-    each = jax.vmap(lambda o, t: _values(chart, list(o), list(shared), t, g), in_axes=(0, 0 if own_lobes else None))
+    each: Any = jax.vmap(lambda o, t: _values(chart, list(o), list(shared), t, g), in_axes=(0, 0 if own_lobes else None))
     f = each(own, tables)
     flat_f, flat_m = (jnp.moveaxis(v, 0, -1).reshape(-1, channels) for v in (f, measured))
     r = jnp.asarray(loss(flat_f, flat_m, g.flat())).reshape(root.size, -1)
@@ -233,8 +236,8 @@ def _scatter(problem: Problem, per_channel: Float[Array, "C ... k k"]) -> Float[
 class Span(eqx.Module):
     """The blocks that a pass visits: ``count`` of them from ``first``. Compressed blocks come before those of cells."""
 
-    first: Array
-    count: Array
+    first: Int[Any, ""]
+    count: Int[Any, ""]
 
     @staticmethod
     def cells(samples: Samples, count: int | None = None) -> Span:
@@ -291,7 +294,7 @@ class Statistics(NamedTuple):
     """sqrt(sum w r^2 / sum w) of each loss asked for."""
 
 
-def statistics(problem: Problem, x: Vector, losses: tuple[Loss, ...] = ()) -> Statistics:
+def statistics(problem: Problem, x: Float[Any, "n"], losses: tuple[Loss, ...] = ()) -> Statistics:
     """What error bars are made of, and the error under each loss, over all cells and channels."""
     n, k, c = problem.size, len(problem.chart.channel), problem.channels
     tables = polar_tables(problem, x)
@@ -333,7 +336,7 @@ def gram_residual(problem: Problem, span: Span) -> Callable[[Vector], Array]:
     the factors of a finite matrix are returned in its place so that no NaN reaches the solver.
     """
     # traced here, once: inside a solver every use of it would be
-    one_pass = eqx.filter_closure_convert(lambda x: gram(problem, x, span), jax.ShapeDtypeStruct((problem.size,), float))
+    one_pass: Any = eqx.filter_closure_convert(partial(gram, problem, span=span), jnp.zeros(problem.size))
 
     def whiten(x: Vector) -> Array:
         g = one_pass(x)
@@ -361,11 +364,11 @@ def _loss_sums(
     for loss in losses:
         relative = loss.weight(g)
         w = jnp.broadcast_to(weight if relative is None else weight * relative, weight.shape).reshape(-1, 1)
-        values = [jnp.moveaxis(v, 0, -1) for v in (f, measured)]
+        p, m = jnp.moveaxis(f, 0, -1), jnp.moveaxis(measured, 0, -1)
         if loss.separable:
-            r = loss(*values, g).reshape(w.size, -1)
+            r = loss(p, m, g).reshape(w.size, -1)
         else:
-            r = jnp.asarray(loss(*(v.reshape(w.size, -1) for v in values), g.flat())).reshape(w.size, -1)
+            r = jnp.asarray(loss(p.reshape(w.size, -1), m.reshape(w.size, -1), g.flat())).reshape(w.size, -1)
         out.append(jnp.stack([jnp.sum(w * r**2), jnp.sum(w) * r.shape[-1]])[None])
     return jnp.concatenate(out)
 

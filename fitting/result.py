@@ -2,13 +2,14 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass, field
+from dataclasses import asdict, dataclass, field
 from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
 
 from ..models import BRDF, build, parameters_of, variants
+from .effort import DEFAULT, Effort
 
 Reals = NDArray[np.float64]
 Named = dict[str, Reals]
@@ -76,6 +77,8 @@ class Fit:
     each (``compressed``), to which the cells then agreed."""
     shift: float = 0.0
     """Standard errors by which one more exact step over all cells would move the parameter that it moves most."""
+    effort: Effort = DEFAULT
+    """The settings it was made with."""
 
     def strong_correlations(self, threshold: float = 0.95) -> list[tuple[str, str, float]]:
         """Pairs of parameters whose estimates are correlated beyond ``threshold``, strongest first."""
@@ -126,6 +129,7 @@ class Fit:
             "passes": self.passes,
             "path": self.path,
             "shift": _plain(self.shift),
+            "effort": asdict(self.effort),
         }
 
 
@@ -167,6 +171,7 @@ def from_record(record: dict[str, Any]) -> Fit:
         passes=record.get("passes", 0),
         path=record.get("path", "exact"),
         shift=record.get("shift") or 0.0,
+        effort=Effort(**record.get("effort", {})),
     )
 
 

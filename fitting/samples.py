@@ -28,7 +28,7 @@ Reals = NDArray[np.float64]
 
 THETA_H_BANDS = 9
 STRIDED = 10
-"""Cells of a block along theta_d and phi_d."""
+"""Cells of a block along theta_d, and by default along phi_d, at most."""
 SCATTERED_BANDS = (6, 4)
 """Bands of scattered samples along theta_h and theta_d."""
 SCATTERED_CELLS = 8160
@@ -99,10 +99,11 @@ class Samples(eqx.Module):
         return Samples(self.cells.channel(c), self.banded, self.band_axes, nodes, remainder)
 
 
-def samples(table: Table, max_angle: float, measure: str) -> tuple[Samples, NDArray[np.bool_]]:
+def samples(table: Table, max_angle: float, measure: str, along_phi: int = STRIDED) -> tuple[Samples, NDArray[np.bool_]]:
     """Blocks of the cells of ``table`` with polar angles up to ``max_angle`` degrees, and which cells those are.
 
-    ``measure`` is ``"solid_angle"`` (a cell counts by its solid angles) or ``"cells"`` (every cell counts once).
+    ``measure`` is ``"solid_angle"`` (a cell counts by its solid angles) or ``"cells"`` (every cell counts once). A block of
+    a grid has at most ``along_phi`` cells of a row.
     Raises ValueError for another measure or an angle outside (0, 90).
     """
     if measure not in ("solid_angle", "cells"):
@@ -120,7 +121,7 @@ def samples(table: Table, max_angle: float, measure: str) -> tuple[Samples, NDAr
         total = max(weight.sum(), 1.0)
     weight = weight / total
     if isinstance(table.layout, HalfDifferenceGrid) and table.layout.isotropic:
-        return _grid_samples(table, table.layout, used, weight, limit), used
+        return _grid_samples(table, table.layout, used, weight, limit, along_phi), used
     return _scattered_samples(table, used, weight, limit), used
 
 
@@ -135,11 +136,11 @@ class _Fold:
     The last axis is long, so that the innermost loops of a pass are; ``(bands, rows, D', P')`` unfolds the cells.
     """
 
-    def __init__(self, shape: tuple[int, ...]) -> None:
+    def __init__(self, shape: tuple[int, ...], along_phi: int = STRIDED) -> None:
         h, d, p = self.shape = shape
         bands = min(THETA_H_BANDS, h)
         rows = -(-h // bands)
-        self.steps = -(-d // STRIDED), -(-p // STRIDED)
+        self.steps = -(-d // STRIDED), -(-p // along_phi)
         self.banded = bands, rows, -(-d // self.steps[0]), -(-p // self.steps[1])
         self.padded = bands * rows, self.banded[2] * self.steps[0], self.banded[3] * self.steps[1]
         self.order = _spread_order(self.steps[0] * self.steps[1])
@@ -173,10 +174,12 @@ class _Fold:
         return a.reshape(a.shape[0], d * step_d, q * step_p)[:h, :depth, :p]
 
 
-def _grid_samples(table: Table, grid: HalfDifferenceGrid, used: NDArray[np.bool_], weight: Reals, limit: float) -> Samples:
-    geometry, rows = _grid_geometry(grid.theta_h.tobytes(), grid.theta_d.tobytes(), grid.phi_d.tobytes(), limit)
+def _grid_samples(
+    table: Table, grid: HalfDifferenceGrid, used: NDArray[np.bool_], weight: Reals, limit: float, along_phi: int
+) -> Samples:
+    geometry, rows = _grid_geometry(_axes(grid), limit, along_phi)
     part = np.ix_(*rows)
-    fold = _Fold((*(len(r) for r in rows), len(grid.phi_d)))
+    fold = _Fold((*(len(r) for r in rows), len(grid.phi_d)), along_phi)
     # channel by channel, so that no copy of the whole table is made on the way
     planes = (fold.fold(np.where(used[part], plane[part], 0.0)) for plane in table.planes)
     first = next(planes)
@@ -191,7 +194,8 @@ CHUNK = 10
 
 
 def compress(whole: Samples, table: Table, used: NDArray[np.bool_], max_angle: float, loss: Loss) -> Samples:
-    """The samples with a compressed copy of the table beside them, made for one loss (bound to the table).
+    """The samples with a compressed copy of the table beside them, made for one loss (bound to the table): each row along
+    phi_d has as many nodes as a block has cells of it.
 
     The same samples where that is not possible: scattered samples, short rows, losses without a transform.
     """
@@ -199,9 +203,9 @@ def compress(whole: Samples, table: Table, used: NDArray[np.bool_], max_angle: f
     if loss.transform is None or loss.inverse is None or not isinstance(grid, HalfDifferenceGrid) or not grid.isotropic:
         return whole
     limit = float(np.radians(max_angle))
-    _, rows = _grid_geometry(grid.theta_h.tobytes(), grid.theta_d.tobytes(), grid.phi_d.tobytes(), limit)
-    fold = _Fold((*(len(r) for r in rows), len(grid.phi_d)))
-    k = fold.banded[3]
+    k = whole.banded[3]
+    _, rows = _grid_geometry(_axes(grid), limit, k)
+    fold = _Fold((*(len(r) for r in rows), len(grid.phi_d)), k)
     if len(grid.phi_d) < 2 * k:
         return whole
     h, d = grid.theta_h[rows[0], None, None], grid.theta_d[None, rows[1], None]
@@ -225,7 +229,7 @@ def compress(whole: Samples, table: Table, used: NDArray[np.bool_], max_angle: f
     values = np.asarray(loss.inverse(jnp.asarray(reduced), at_nodes))
     relative = loss.weight(at_nodes)
     node_weight = node_weight if relative is None else node_weight / np.asarray(relative)
-    nodes = _Fold((*(len(r) for r in rows), k))
+    nodes = _Fold((*(len(r) for r in rows), k), k)
     blocks = Blocks(_folded(at_nodes, nodes, limit), nodes(values), nodes(node_weight))
     return Samples(whole.cells, whole.banded, whole.band_axes, blocks, jnp.asarray(np.maximum(remainder, 0.0)))
 
@@ -258,21 +262,25 @@ def _plain_geometry(h: Reals, d: Reals, phi: Reals, fitted: NDArray[np.bool_]) -
     return Geometry(cos_i, cos_o, cos_h, sin2_h, cos_d, sin2_d)
 
 
+def _axes(grid: HalfDifferenceGrid) -> tuple[bytes, bytes, bytes]:
+    return grid.theta_h.tobytes(), grid.theta_d.tobytes(), grid.phi_d.tobytes()
+
+
 @lru_cache(maxsize=1)
 def _grid_geometry(
-    theta_h: bytes, theta_d: bytes, phi_d: bytes, limit: float
+    axes: tuple[bytes, bytes, bytes], limit: float, along_phi: int
 ) -> tuple[Geometry, tuple[NDArray[np.int64], NDArray[np.int64]]]:
     """Geometry of a half/difference grid in blocks, and the rows of theta_h and theta_d that have any cell within the
     limit; the tables of a batch share it.
     """
-    h, d, p = (np.frombuffer(a) for a in (theta_h, theta_d, phi_d))
+    h, d, p = (np.frombuffer(a) for a in axes)
     cos_i, cos_o = HalfDifferenceGrid(h, d, p, h, d, p).polar_cosines()
     valid = (cos_i >= np.cos(limit) - 1e-12) & (cos_o >= np.cos(limit) - 1e-12)
     rows = np.flatnonzero(valid.any((1, 2))), np.flatnonzero(valid.any((0, 2)))
     # Guard: cells that are not fitted have weight 0, and 0 * inf = NaN: they get a harmless direction
     # (tests/test_samples.py::test_unused_cells_are_harmless).
     g = _plain_geometry(h[rows[0], None, None], d[None, rows[1], None], p, valid[np.ix_(*rows)])
-    return _folded(g, _Fold(g.cos_i.shape), limit), rows
+    return _folded(g, _Fold(g.cos_i.shape, along_phi), limit), rows
 
 
 def _scattered_samples(table: Table, used: NDArray[np.bool_], weight: Reals, limit: float) -> Samples:

@@ -4,14 +4,15 @@ from __future__ import annotations
 
 from collections.abc import Iterator
 from dataclasses import dataclass
-from typing import NamedTuple
+from typing import Any, NamedTuple
 
 import equinox as eqx
 import numpy as np
-from jaxtyping import Array
+from jaxtyping import Float
 from numpy.typing import NDArray
 
 from ..programs import program
+from .effort import DEFAULT, Effort
 from .gram import Problem, Span, gram_residual
 from .result import Optimum
 from .solver import Box, Minimum, minimise
@@ -20,8 +21,6 @@ COLOUR_BLOCKS = (2, 1)
 """Blocks of cells, and compressed blocks, for refitting the linear coordinates alone."""
 COARSE_BLOCKS = (6, 3)
 """Blocks of cells, and compressed blocks, for polishing the best shapes."""
-POLISHED = 7
-"""Starts that are polished on the coarse table, of each chart."""
 FINISHED = 3
 """Distinct optima of the coarse table that are carried to the whole one, at most."""
 SAME = 1e-3
@@ -35,8 +34,8 @@ class Stage(eqx.Module):
     """How much of the table a search looks at, when it stops, and how careful its first step is."""
 
     span: Span
-    rtol: Array
-    damping: Array
+    rtol: Float[Any, ""]
+    damping: Float[Any, ""]
 
     @staticmethod
     def of(span: Span, rtol: float, damping: float) -> Stage:
@@ -45,7 +44,7 @@ class Stage(eqx.Module):
 
 
 @program
-def solve(problem: Problem, x: Array, box: Box, stage: Stage) -> Minimum:
+def solve(problem: Problem, x: Float[Any, "n"], box: Box, stage: Stage) -> Minimum:
     """Minimise from x. One program for coarse and whole tables and for any bounds."""
     return minimise(gram_residual(problem, stage.span), x, box, stage.rtol, stage.damping, MAX_STEPS)
 
@@ -74,7 +73,7 @@ class Candidate(NamedTuple):
     minimum: Minimum
 
 
-def search(problems: list[tuple[Problem, Box, list[NDArray[np.float64]]]]) -> Found:
+def search(problems: list[tuple[Problem, Box, list[NDArray[np.float64]]]], effort: Effort = DEFAULT) -> Found:
     """Best optimum over problems that differ in their chart only, each with a box and starts in its coordinates.
 
     Every start gets its linear coordinates refitted on a coarse table; the best shapes are then polished there, all
@@ -84,16 +83,17 @@ def search(problems: list[tuple[Problem, Box, list[NDArray[np.float64]]]]) -> Fo
     samples = problems[0][0].samples
     fast = samples.compressed > 0
     part = Span.nodes if fast else Span.cells
+    blocks = samples.compressed if fast else max(1, round(effort.cells * samples.blocks))
     coarse = (
-        Stage.of(part(samples, COLOUR_BLOCKS[fast]), 1e-2, 1e-2),
-        Stage.of(part(samples, COARSE_BLOCKS[fast]), 1e-6, 1.0),
+        Stage.of(part(samples, min(COLOUR_BLOCKS[fast], blocks)), 1e-2, 1e-2),
+        Stage.of(part(samples, min(COARSE_BLOCKS[fast], blocks)), 1e-6, 1.0),
     )
-    whole = Stage.of(part(samples), 1e-9, 1e-6)
+    whole = Stage.of(part(samples, blocks), effort.rtol, 1e-6)
     polished: list[Candidate] = []
     tried = 0
     for problem, box, starts in problems:
         tried += len(starts)
-        polished = sorted([*polished, *_polished(problem, box, starts, *coarse)], key=_cost)
+        polished = sorted([*polished, *_polished(problem, box, starts, *coarse, effort.starts)], key=_cost)
         best = polished[0]
         if not best.problem.chart.continues(np.asarray(best.minimum.x), problem.channels):
             break
@@ -115,7 +115,7 @@ def search(problems: list[tuple[Problem, Box, list[NDArray[np.float64]]]]) -> Fo
 
 
 def _polished(
-    problem: Problem, box: Box, starts: list[NDArray[np.float64]], colour: Stage, coarse: Stage
+    problem: Problem, box: Box, starts: list[NDArray[np.float64]], colour: Stage, coarse: Stage, count: int
 ) -> Iterator[Candidate]:
     """The best starts after a refit of the linear coordinates, polished; of doubles only one."""
     linear = np.asarray([c.linear for c, _ in problem.chart.vector(problem.channels)])
@@ -123,7 +123,7 @@ def _polished(
     ranked = sorted((_candidate(problem, box, solve(problem, x, colours, colour)) for x in starts), key=_cost)
     kept: list[Candidate] = []
     for c in ranked:
-        if len(kept) < POLISHED and not (kept and c.cost <= kept[-1].cost * (1 + 1e-9)):
+        if len(kept) < count and not (kept and c.cost <= kept[-1].cost * (1 + 1e-9)):
             kept.append(c)
     for c in kept or ranked[:1]:
         yield _candidate(problem, box, solve(problem, c.minimum.x, box, coarse))

@@ -26,9 +26,9 @@ goes up and down at random, and a search for less goes on as long as it may."""
 class Box(eqx.Module):
     """Bounds of a vector, and which of its elements may move at all."""
 
-    lower: Vector
-    upper: Vector
-    free: Bool[Array, "n"]
+    lower: Float[Any, "n"]
+    upper: Float[Any, "n"]
+    free: Bool[Any, "n"]
 
 
 class _State(eqx.Module):

@@ -54,7 +54,8 @@ CASES = [
 def test_coverage(case):
     """68.3 % of the parameters lie within one standard error, 95.4 % within two; +-6 and +-3 points.
 
-    With 1,400 deviations and more, of which each table's 7 to 18 are correlated, the first share itself varies by 1.2 to 2.5 points.
+    With 1,400 deviations and more, of which each table's 7 to 18 are correlated, the first share itself varies by 1.2 to
+    2.5 points.
     """
     deviations, errors = draws(*case)
     assert np.mean(np.abs(deviations) <= 1) == pytest.approx(0.683, abs=0.06)

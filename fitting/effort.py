@@ -1,0 +1,45 @@
+"""How hard a fit tries: every setting that trades time for accuracy, in one place."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+PATHS = ("auto", "compressed", "exact")
+
+
+@dataclass(frozen=True)
+class Effort:
+    """Settings of a fit that cost time and buy accuracy; the defaults are those of a fit that can be relied on.
+
+    Raises ValueError for a value out of range.
+    """
+
+    path: str = "auto"
+    """``"compressed"``: rows along phi_d stand for their cells (:mod:`brdfit.fitting.compression`). ``"exact"``: every cell
+    counts in every step. ``"auto"``: compressed, judged by all cells, and exact from there on if they disagree."""
+    nodes: int = 10
+    """Nodes of a compressed row, at least 2; also the cells of a row that a block of the table has."""
+    cells: float = 1.0
+    """Share of the table that an exact search looks at, in (0, 1]: below 1 it is a subsample. Error bars and errors are
+    always those of all cells."""
+    starts: int = 7
+    """How many starts are polished after their colours were fitted, of each chart; at least 1."""
+    rtol: float = 1e-9
+    """Relative decrease of the cost in a step below which the last search ends, in (0, 1)."""
+
+    def __post_init__(self) -> None:
+        if self.path not in PATHS:
+            raise ValueError(f"effort: unknown path {self.path!r}: choose from {', '.join(PATHS)}")
+        if self.nodes < 2:
+            raise ValueError(f"effort: nodes must be at least 2, not {self.nodes}")
+        if not 0 < self.cells <= 1:
+            raise ValueError(f"effort: cells must lie in (0, 1], not {self.cells:g}")
+        if self.starts < 1:
+            raise ValueError(f"effort: starts must be at least 1, not {self.starts}")
+        if not 0 < self.rtol < 1:
+            raise ValueError(f"effort: rtol must lie in (0, 1), not {self.rtol:g}")
+
+
+DEFAULT = Effort()
+
+__all__ = ["DEFAULT", "PATHS", "Effort"]

@@ -1,0 +1,78 @@
+"""Settings that trade time for accuracy: each does what it says, and results remember which they were made with."""
+
+from __future__ import annotations
+
+import json
+
+import brdfit
+import numpy as np
+import pytest
+from brdfit import Effort
+from brdfit.data.synthetic import Relative, generate
+from brdfit.fitting.result import from_record
+
+
+@pytest.fixture(scope="module")
+def table():
+    """A material that Ward cannot reproduce, with noise."""
+    return generate("misfit-two-lobes", grid=(30, 20, 60), noise=[Relative(0.02)], seed=1)[0]
+
+
+def shift(fit: brdfit.Fit, other: brdfit.Fit) -> float:
+    """Largest difference of parameters in standard errors."""
+    return max(float(np.max(np.abs(fit.parameters[n] - other.parameters[n]) / other.stderr[n])) for n in fit.parameters)
+
+
+def test_paths_agree_at_the_optimum(table):
+    exact = brdfit.fit(table, "ward", effort=Effort(path="exact", rtol=1e-13))
+    auto = brdfit.fit(table, "ward")
+    assert (exact.path, auto.path) == ("exact", "compressed")
+    assert exact.shift < 0.01  # the optimum of the cells themselves
+    # what compression moves is what the judgement of the cells said it would, to first order, and tolerated
+    assert shift(auto, exact) < 0.1
+    assert shift(auto, exact) == pytest.approx(auto.shift, rel=0.2, abs=0.01)
+
+
+def test_more_nodes_are_closer(table):
+    """The error of compression falls faster than any power of the number of nodes: from 3 to 6 by far more than 10."""
+    few, more = (brdfit.fit(table, "ward", effort=Effort(path="compressed", nodes=k)) for k in (3, 6))
+    assert few.path == more.path == "compressed"
+    assert more.shift < few.shift / 10
+
+
+def test_a_subsample_is_worse_and_says_so(table):
+    """Cells left out move parameters by about sqrt(1/share) standard errors, which the judgement of all cells sees."""
+    part = brdfit.fit(table, "ward", effort=Effort(path="exact", cells=0.1))
+    whole = brdfit.fit(table, "ward", effort=Effort(path="exact"))
+    assert part.errors["log"] > whole.errors["log"]
+    assert part.shift > 1
+    assert part.passes < whole.passes
+    for name, value in whole.stderr.items():  # error bars are of all cells either way
+        np.testing.assert_allclose(part.stderr[name], value, rtol=0.3)
+
+
+def test_fewer_starts(table):
+    one, seven = (brdfit.fit(table, "gtr", effort=Effort(starts=k)) for k in (1, 7))
+    assert sum(o.starts for o in one.optima) < sum(o.starts for o in seven.optima)
+    assert one.errors["log"] >= seven.errors["log"] * (1 - 1e-9)
+
+
+def test_result_remembers(table):
+    effort = Effort(path="compressed", nodes=4, starts=2, rtol=1e-5)
+    fit = brdfit.fit(table, "lambert", effort=effort)
+    assert from_record(json.loads(json.dumps(fit.record()))).effort == fit.effort == effort
+
+
+@pytest.mark.parametrize(
+    ("values", "named"),
+    [
+        ({"path": "fast"}, "unknown path 'fast': choose from auto, compressed, exact"),
+        ({"nodes": 1}, "nodes must be at least 2, not 1"),
+        ({"cells": 0.0}, r"cells must lie in \(0, 1\], not 0"),
+        ({"starts": 0}, "starts must be at least 1, not 0"),
+        ({"rtol": 1.0}, r"rtol must lie in \(0, 1\), not 1"),
+    ],
+)
+def test_values_out_of_range(values, named):
+    with pytest.raises(ValueError, match=named):
+        Effort(**values)
