@@ -51,7 +51,8 @@ def uncertainty(bands: Reals, middle: Reals, moving: NDArray[np.bool_]) -> Uncer
     deviation = steps - steps.mean(0)
     count = len(steps)
     jackknife[np.ix_(at, at)] = (count - 1) / count * deviation.T @ deviation
-    errors = np.sqrt(np.diag(statistical)[at])
+    # rounding takes a variance of 0 below it (tests/test_hostile.py::test_hostile_tables)
+    errors = np.sqrt(np.maximum(np.diag(statistical)[at], 0.0))
     step = np.abs(_delete(total, at))
     with np.errstate(divide="ignore", invalid="ignore"):
         shift[at] = np.where(step > 0, step / errors, 0.0)

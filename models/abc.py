@@ -40,4 +40,4 @@ class ABC(BRDF):
         """Value in 1/sr."""
         lobe = ndf.ABC(self.b, self.c)
         f = self.specular * dielectric(self.ior, g)
-        return lambert(self.diffuse) + microfacet(lobe(g.sin2_h, g.cos2_h), f, vcavity(g), g)
+        return lambert(self.diffuse) + microfacet(lobe(g.sin2_h, g.cos2_h), f, vcavity(g))

@@ -40,4 +40,4 @@ class GTR(BRDF):
         """Value in 1/sr."""
         lobe = ndf.GTR(self.alpha, self.gamma)
         f = schlick(self.specular, g)
-        return lambert(self.diffuse) + microfacet(lobe(g.sin2_h, g.cos2_h), f, smith_correlated(lobe, g), g)
+        return lambert(self.diffuse) + microfacet(lobe(g.sin2_h, g.cos2_h), f, smith_correlated(lobe, g))

@@ -42,4 +42,4 @@ class SGD(BRDF):
         """Value in 1/sr."""
         lobe = ndf.SGD(self.alpha, self.p)
         f = self.specular * sgd_fresnel(self.f0, self.f1, g)
-        return lambert(self.diffuse) + microfacet(lobe(g.sin2_h, g.cos2_h), f, smith_separable(lobe, g), g)
+        return lambert(self.diffuse) + microfacet(lobe(g.sin2_h, g.cos2_h), f, smith_separable(lobe, g))

@@ -56,7 +56,7 @@ class Views:
         self.table = table
         self._missing: dict[str, str] = {}
         self._lobe_at = _lobe_directions(table, self._missing)
-        self._sphere_at = _sphere_directions()
+        self._sphere_at = sphere_directions()
         self._albedo_at = albedo_directions()
         self._cells_at = _cells(table, max_angle)
         lobes = self._lobe_at[1:3] if self._lobe_at else (np.zeros((0, 3)),) * 2
@@ -91,7 +91,7 @@ class Views:
             channel_names=channel_names(table),
             lobes=lobes,
             maps=_maps(at_cells, self._cells_at),
-            sphere=_sphere(table, self._sphere_at, at_sphere, missing),
+            sphere=sphere(table, self._sphere_at, at_sphere, missing),
             albedo=_albedo(table, self._albedo_at, at_albedo),
             missing=missing,
         )
@@ -206,7 +206,7 @@ def _turn(angle: Any) -> Any:
     return np.angle(np.exp(1j * np.asarray(angle)))
 
 
-def _sphere_directions() -> tuple[NDArray[np.uint8], Reals, Reals]:
+def sphere_directions() -> tuple[NDArray[np.uint8], Reals, Reals]:
     """Which pixels are lit, and light and viewer in the frame of the surface at each lit pixel."""
     x = (np.arange(PIXELS) + 0.5) / PIXELS * 2 - 1
     x, y = np.meshgrid(x * 1.02, -x * 1.02)
@@ -222,7 +222,8 @@ def _sphere_directions() -> tuple[NDArray[np.uint8], Reals, Reals]:
     return state, frame @ light, frame @ np.array([0.0, 0.0, 1.0])
 
 
-def _sphere(table: Table, at: tuple[NDArray[np.uint8], Reals, Reals], values: Reals, missing: dict[str, str]) -> Sphere:
+def sphere(table: Table, at: tuple[NDArray[np.uint8], Reals, Reals], values: Reals, missing: dict[str, str]) -> Sphere:
+    """A sphere of the table and of fits with ``values [M, n, C]`` at :func:`sphere_directions`."""
     state, wi, wo = at
     if isinstance(table.layout, HalfDifferenceGrid):
         measured = interpolate(table, wi, wo)
@@ -314,4 +315,4 @@ def _maps(fitted: Reals, cells: tuple[Reals, Reals, Reals, NDArray[np.bool_], ND
     return Maps(edges_h, edges_d, np.stack(signed) if signed else empty, np.stack(rms) if rms else empty, how)
 
 
-__all__ = ["Views", "fit_key", "gather", "interpolate"]
+__all__ = ["Views", "fit_key", "gather", "interpolate", "sphere", "sphere_directions"]

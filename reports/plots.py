@@ -83,7 +83,7 @@ def styles(names: Sequence[str]) -> dict[str, dict[str, Any]]:
     return out
 
 
-def _figure(
+def new_figure(
     width: float, height: float, margins: tuple[float, float, float, float], rows: int = 1, columns: int = 1, **options: Any
 ) -> tuple[Any, NDArray[Any]]:
     """A figure of ``width`` x ``height`` inches with axes inside ``margins`` (left, right, bottom, top), in inches."""
@@ -98,7 +98,7 @@ def _figure(
 
 
 @contextmanager
-def _styled(salt: str = "", grid: bool = True) -> Iterator[None]:
+def styled(salt: str = "", grid: bool = True) -> Iterator[None]:
     """The style of all figures. The ids in an SVG are hashes of printed numbers, so it settles how numbers print, too."""
     import matplotlib
 
@@ -107,7 +107,7 @@ def _styled(salt: str = "", grid: bool = True) -> Iterator[None]:
         yield
 
 
-def _svg(figure: Any, alt: str) -> str:
+def as_svg(figure: Any, alt: str) -> str:
     """The figure as an inline SVG element with a text alternative, without ids that could clash in a page."""
     out = io.StringIO()
     figure.savefig(out, format="svg", metadata={"Date": None})
@@ -129,8 +129,8 @@ def lobes(part: Lobes, fits: Sequence[tuple[int, str]], alt: str, salt: str) -> 
 
     style = styles([label for _, label in fits])
     columns = len(part.theta_i)
-    with _styled(salt):
-        figure, axes = _figure(10, 4.9, (0.6, 0.05, 0.45, 0.6), 2, columns)
+    with styled(salt):
+        figure, axes = new_figure(10, 4.9, (0.6, 0.05, 0.45, 0.6), 2, columns)
         figure.subplots_adjust(wspace=0.2, hspace=0.22)
         measured = luminance(part.measured)
         fitted = luminance(part.fitted)
@@ -165,7 +165,7 @@ def lobes(part: Lobes, fits: Sequence[tuple[int, str]], alt: str, salt: str) -> 
         axes[1, 0].set_ylabel("BRDF near the peak, 1/sr")
         handles, labels = axes[0, 0].get_legend_handles_labels()
         figure.legend(handles, labels, loc="upper center", ncols=min(len(labels), 8), handlelength=3)
-        return _svg(figure, alt)
+        return as_svg(figure, alt)
 
 
 def channels(part: Lobes, row: int, names: Sequence[str], alt: str, salt: str) -> str:
@@ -175,8 +175,8 @@ def channels(part: Lobes, row: int, names: Sequence[str], alt: str, salt: str) -
     columns = len(part.theta_i)
     count = part.measured.shape[-1]
     colours = RGB if count == 3 else [f"C{c % 10}" for c in range(count)]
-    with _styled(salt):
-        figure, axes = _figure(10, 2.7, (0.6, 0.05, 0.45, 0.3), 1, columns, sharey="row")
+    with styled(salt):
+        figure, axes = new_figure(10, 2.7, (0.6, 0.05, 0.45, 0.3), 1, columns, sharey="row")
         figure.subplots_adjust(wspace=0.08)
         for k, angle in enumerate(part.theta_i):
             ax = axes[0, k]
@@ -194,7 +194,7 @@ def channels(part: Lobes, row: int, names: Sequence[str], alt: str, salt: str) -
         axes[0, 0].set_ylabel("BRDF, 1/sr (log)")
         if count <= 8:
             axes[0, 0].legend(loc="upper left", handlelength=1.2, ncols=1 if count <= 4 else 2)
-        return _svg(figure, alt)
+        return as_svg(figure, alt)
 
 
 def _floor(values: NDArray[Any]) -> float:
@@ -222,10 +222,10 @@ def maps(part: Maps, fits: Sequence[tuple[int, str]]) -> str:
     limit = float(np.percentile(np.abs(part.signed[rows][known]), 98)) if known.any() else 1.0
     top = float(np.percentile(part.rms[rows][known], 98)) if known.any() else 1.0
     limit, top = max(limit, 1e-6), max(top, 1e-6)
-    with _styled(grid=False):
+    with styled(grid=False):
         columns = len(rows)
         width = 1.72 * columns + 1.5
-        figure, axes = _figure(width, 4.0, (0.55, 0.95, 0.45, 0.3), 2, columns, sharex=True, sharey=True)
+        figure, axes = new_figure(width, 4.0, (0.55, 0.95, 0.45, 0.3), 2, columns, sharex=True, sharey=True)
         figure.subplots_adjust(wspace=0.1, hspace=0.12)
         ticks = np.array([0, 1, 5, 20, 45, 90])
         for k, (m, label) in enumerate(fits):
@@ -313,8 +313,8 @@ def _uri(png: bytes) -> str:
 def albedo(part: Albedo, fits: Sequence[tuple[int, str]], max_angle: float, alt: str, salt: str) -> str:
     """Directional albedo, the mean of the channels, over the angle of incidence; the measured one up to ``max_angle``."""
     style = styles([label for _, label in fits])
-    with _styled(salt):
-        figure, axes = _figure(5.2, 3.0, (0.55, 1.75, 0.45, 0.1))
+    with styled(salt):
+        figure, axes = new_figure(5.2, 3.0, (0.55, 1.75, 0.45, 0.1))
         ax = axes[0, 0]
         enough = (part.covered > 0.98) & (part.theta_i <= max_angle + 1e-6)
         if enough.any():
@@ -342,14 +342,14 @@ def albedo(part: Albedo, fits: Sequence[tuple[int, str]], max_angle: float, alt:
         ax.set_xlabel("light θ$_i$, degrees")
         ax.set_ylabel("albedo")
         figure.legend(loc="upper right", handlelength=2.2)
-        return _svg(figure, alt)
+        return as_svg(figure, alt)
 
 
 def tradeoff(points: Sequence[tuple[str, float, float]], limit: float, alt: str, salt: str) -> str:
     """Error over the time of the solve; ``points`` are (label, seconds, error)."""
     style = styles([p[0] for p in points])
-    with _styled(salt):
-        figure, axes = _figure(5.2, 3.0, (0.6, 0.1, 0.45, 0.1))
+    with styled(salt):
+        figure, axes = new_figure(5.2, 3.0, (0.6, 0.1, 0.45, 0.1))
         ax = axes[0, 0]
         ax.set_xscale("log")
         ax.set_yscale("log")
@@ -370,4 +370,4 @@ def tradeoff(points: Sequence[tuple[str, float, float]], limit: float, alt: str,
             axis.set_minor_formatter(NullFormatter())
         ax.set_xlabel("solve, seconds")
         ax.set_ylabel("perceptual error")
-        return _svg(figure, alt)
+        return as_svg(figure, alt)

@@ -168,7 +168,7 @@ def _anisotropic(name: str, shape: str, density: Callable[..., Any]) -> Part:
 
 def _smith(shape: str, lobe: type) -> Part:
     def program(x: Array) -> Array:
-        return 1 / (1 + masking.smith_lambda(lobe(x[0], x[1]), x[2]))
+        return x[2] / (x[2] + masking.averted_area(lobe(x[0], x[1]), x[2]))
 
     ranges = domain.SHAPES[shape]
     angle, name = "polar angle", f"Smith, {shape}"

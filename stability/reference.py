@@ -19,8 +19,8 @@ def _model(name: str) -> Callable[..., Any]:
 
 
 def _scaled_gamma(alpha: Any, p: Any) -> Any:
-    """Gamma(1 - p, alpha) / (m^(1-p) e^-m), m = max(alpha, 1 - p)."""
-    m = max(alpha, 1 - p)
+    """Gamma(1 - p, alpha) / (m^(1-p) e^-m), the scale m = max(alpha, 1 - p) taken as a number that stays while they move."""
+    m = mpf(float(max(alpha, 1 - p)))
     return oracle.upper_gamma(1 - p, alpha) / (m ** (1 - p) * mp.exp(-m))
 
 
@@ -38,7 +38,7 @@ REFERENCES: dict[str, dict[str, Callable[..., Any]]] = {
     "masking": {
         "Smith, GTR": oracle.gtr_masking,
         "Smith, SGD": oracle.sgd_masking,
-        "vcavity": lambda *x: oracle.vcavity(x[:3], x[3:]),
+        "vcavity": lambda *x: oracle.vcavity(x[:3], x[3:]) / (4 * x[2] * x[5]),
     },
     "fresnel": {
         "dielectric": lambda ior, theta: oracle.dielectric(ior, mp.cos(theta)),

@@ -1,5 +1,6 @@
-"""Masking-shadowing: the part of the microfacets that light and viewer both see."""
+"""Masking-shadowing: the part G of the microfacets that light and viewer both see, as V = G / (4 (n.l)(n.v))."""
 
+from .smith import averted_area as averted_area
 from .smith import smith_correlated as smith_correlated
 from .smith import smith_lambda as smith_lambda
 from .smith import smith_separable as smith_separable

@@ -1,7 +1,8 @@
 """Normal distribution functions D(m), in 1/sr, of the half vector.
 
 Isotropic ones are called with ``(sin^2, cos^2)`` of the angle to the normal, both accurate where they are small, so that
-the same object serves a BRDF (at the half vector) and Smith's integral (at every microfacet). Each is normalised:
+the same object serves a BRDF (at the half vector) and Smith's integral (at every microfacet, with cos^2 = 0 at normal
+incidence, where value and slopes must be finite). Each is normalised:
 the integral of D(m) (n.m) over the hemisphere is 1 (Hoffman 2013, eq. 15).
 """
 

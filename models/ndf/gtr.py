@@ -14,10 +14,11 @@ class GTR(eqx.Module):
 
     ``alpha`` > 0 is the width, ``gamma`` > 0 the fall-off: 2 is Trowbridge-Reitz (GGX), 1 is Berry's distribution.
 
-    Evaluated as  D = phi(M) / (pi phi((1-gamma) M)) / (1 + expm1(M) u)^gamma,  phi(x) = (e^x - 1)/x,  M = |ln alpha^2|,
-    u = sin^2 for alpha <= 1 and cos^2 above: the same number, but without the singularities of k at gamma = 1 and
-    alpha = 1, without cancellation in the base, and in range from the power law (alpha -> 0) to the Gaussian
-    exp(-K sin^2) that gamma -> infinity with K = gamma (1/alpha^2 - 1) fixed tends to.
+    Evaluated as  D = phi(M) / (pi phi((1-gamma) M)) / (1 + w u)^gamma,  phi(x) = (e^x - 1)/x,  M = |ln alpha^2|,
+    w = e^M - 1, u = sin^2 for alpha <= 1 and cos^2 above: the same number, but without the singularities of k at gamma = 1
+    and alpha = 1, without cancellation in the base, and in range from the power law (alpha -> 0) to the Gaussian
+    exp(-K sin^2) that gamma -> infinity with K = gamma (1/alpha^2 - 1) fixed tends to. w is formed from alpha, since a
+    rounding of M counts M times in e^M, and then gamma times.
     """
 
     alpha: Float[Array, ""]
@@ -25,11 +26,12 @@ class GTR(eqx.Module):
 
     def __call__(self, sin2: Float[Array, "..."], cos2: Float[Array, "..."]) -> Float[Array, "..."]:
         """D in 1/sr."""
-        log_alpha2 = 2 * jnp.log(self.alpha)
-        narrow = log_alpha2 <= 0
+        a, log_alpha2 = self.alpha, 2 * jnp.log(self.alpha)
+        narrow = a <= 1
         m = jnp.where(narrow, -log_alpha2, log_alpha2)  # not abs: its derivative at alpha = 1 would be 0
+        w = jnp.where(narrow, (1 - a) / a * ((1 + a) / a), (a - 1) * (a + 1))
         u = jnp.where(narrow, sin2, cos2)
         # Guard: a reciprocal, because the derivative of a quotient a/b forms a db, 1e43 here, beyond float32
         # (tests/test_stability.py::test_random_draws_are_finite).
         k = expm1_ratio(m) * (1 / (jnp.pi * expm1_ratio((1 - self.gamma) * m)))
-        return k * jnp.exp(-self.gamma * jnp.log1p(jnp.expm1(m) * u))
+        return k * jnp.exp(-self.gamma * jnp.log1p(w * u))
