@@ -48,6 +48,9 @@ class Geometry(eqx.Module):
     stencil_i: PolarStencil | None = None
     """Where theta_i lies on a table of polar angles; None to evaluate functions of it directly."""
     stencil_o: PolarStencil | None = None
+    slope_x2: Field | None = None
+    """h_x^2/h_z^2; None to form it of h_x2 and cos_h, which between grazing directions depend on each other."""
+    slope_y2: Field | None = None
 
     tables: PolarTables | None = eqx.field(static=True, default=None)
     """Tables of polar angles made beforehand; None to make them where they are asked for."""
@@ -120,8 +123,16 @@ class Geometry(eqx.Module):
             raise ValueError("an anisotropic model needs the azimuth of the half vector, and this table is isotropic")
         return self.h_x2, self.h_y2
 
+    def slopes(self) -> tuple[Field, Field]:
+        """Squared slopes of h along tangent and bitangent, h_x^2/h_z^2 and h_y^2/h_z^2; raises as :meth:`tangential`."""
+        x2, y2 = self.tangential()
+        if self.slope_x2 is not None and self.slope_y2 is not None:
+            return self.slope_x2, self.slope_y2
+        over = 1 / self.cos2_h
+        return x2 * over, y2 * over
+
     def flat(self) -> Geometry:
-        """The same geometry with every field broadcast and flattened to ``[n]``; stencils are left out."""
+        """The same geometry with every field broadcast and flattened to ``[n]``; stencils and slopes are left out."""
         shape = self.shape
         fields = (self.cos_i, self.cos_o, self.cos_h, self.sin2_h, self.cos_d, self.sin2_d, self.h_x2, self.h_y2)
         return Geometry(*(None if f is None else jnp.broadcast_to(f, shape).reshape(-1) for f in fields))  # type: ignore[arg-type]
@@ -131,23 +142,32 @@ def from_directions(wi: ArrayLike, wo: ArrayLike) -> Geometry:
     """Geometry of unit vectors ``[..., 3]`` to light and viewer, in the precision they come in."""
     wi, wo = jnp.asarray(wi), jnp.asarray(wo)
     wi, wo = jnp.broadcast_arrays(wi, wo)
-    total, difference = wi + wo, wi - wo
+    return from_sums(wi + wo, wi - wo, wi[..., 2], wo[..., 2])
+
+
+def from_sums(total: Array, difference: Array, cos_i: Array, cos_o: Array) -> Geometry:
+    """Geometry of l + v and l - v, ``[..., 3]``, and of n.l and n.v, ``[...]``."""
     total2 = jnp.sum(total * total, -1)
     difference2 = jnp.sum(difference * difference, -1)
     # |l + v|^2 + |l - v|^2 is 4 for unit vectors; dividing by it keeps theta_d right for vectors normalised to rounding.
     square = total2 + difference2
-    h_x2 = total[..., 0] ** 2 / total2
-    h_y2 = total[..., 1] ** 2 / total2
+    x2, y2, z2 = (total[..., k] ** 2 for k in range(3))
+    # The derivative of z/|l + v| cancels where x^2 + y^2 is small, that of (x^2 + y^2)/|l + v|^2 where z is, and between two
+    # directions that graze |l + v| may be 1e-4 (tests/test_stability.py::test_single_precision).
+    high = x2 + y2 < z2
+    tan2 = (x2 + y2) / jnp.where(high, z2, 1)
     return Geometry(
-        cos_i=wi[..., 2],
-        cos_o=wo[..., 2],
-        cos_h=total[..., 2] / jnp.sqrt(total2),
-        sin2_h=h_x2 + h_y2,
+        cos_i=cos_i,
+        cos_o=cos_o,
+        cos_h=jnp.where(high, 1 / jnp.sqrt(1 + tan2), total[..., 2] / jnp.sqrt(total2)),
+        sin2_h=jnp.where(high, (x2 + y2) / total2, 1 - z2 / total2),
         cos_d=jnp.sqrt(total2 / square),
         sin2_d=difference2 / square,
-        h_x2=h_x2,
-        h_y2=h_y2,
+        h_x2=x2 / total2,
+        h_y2=y2 / total2,
+        slope_x2=x2 / z2,
+        slope_y2=y2 / z2,
     )
 
 
-__all__ = ["Geometry", "from_directions"]
+__all__ = ["Geometry", "from_directions", "from_sums"]

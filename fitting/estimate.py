@@ -76,25 +76,26 @@ def judge(problem: Problem, x: Reals, box: Box, losses: tuple[Loss, ...]) -> Jud
     unknown = (np.abs(jacobian) * u.undetermined).sum(1) > 0
     at = {p.name: [i for i, r in enumerate(rows) if r[0] == p.name] for p in specs}
 
-    def deviation(matrix: Reals) -> Named:
-        variance = np.where(unknown, np.nan, np.diag(matrix))
+    def deviation(matrix: Reals) -> Reals:
         # a parameter that nothing moves, held or at a bound, has no standard error: not 0, which would claim certainty
-        size = np.sqrt(np.where(variance > 0, variance, np.nan))
-        return {name: size[i].reshape(parameters[name].shape) for name, i in at.items()}
+        variance = np.diag(matrix)
+        return np.asarray(np.sqrt(np.where((variance > 0) & ~unknown, variance, np.nan)))
+
+    def named(sizes: Reals) -> Named:
+        return {name: sizes[i].reshape(parameters[name].shape) for name, i in at.items()}
 
     def between(a: str, b: str) -> Reals:
         block: Reals = statistical[np.ix_(at[a], at[b])].reshape(parameters[a].shape + parameters[b].shape)
         return block
 
-    scale = np.sqrt(np.diag(statistical))
-    scale = np.where((scale > 0) & ~unknown, scale, np.nan)
+    scale = deviation(statistical)
     labels = tuple(_label(r) for r in rows)
     ends = free & (at_lower | at_upper)
     bounded = [(c.parameter, k) for (c, k), end in zip(chart.vector(channels), ends, strict=True) if end]
     estimate = Estimate(
         parameters,
-        deviation(statistical),
-        deviation(jackknife),
+        named(scale),
+        named(deviation(jackknife)),
         {a: {b: between(a, b) for b in at} for a in at},
         tuple(f"{_label(b)} = {float(parameters[b[0]][() if b[1] is None else b[1]]):.6g}" for b in bounded),
         labels,

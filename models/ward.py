@@ -58,6 +58,5 @@ class WardAnisotropic(BRDF):
 
     def evaluate(self, g: Geometry) -> Float[Array, "..."]:
         """Value in 1/sr."""
-        x2, y2 = g.tangential()
-        d = ndf.anisotropic_gaussian(x2, y2, g.cos2_h, self.alpha_x, self.alpha_y)
+        d = ndf.anisotropic_gaussian(*g.slopes(), self.alpha_x, self.alpha_y)
         return lambert(self.diffuse) + self.specular * (d / (4 * jnp.sqrt(g.cos_i * g.cos_o)))

@@ -19,8 +19,8 @@ def _model(name: str) -> Callable[..., Any]:
 
 
 def _scaled_gamma(alpha: Any, p: Any) -> Any:
-    """Gamma(1 - p, alpha) / (m^(1-p) e^-m), the scale m = max(alpha, 1 - p) taken as a number that stays while they move."""
-    m = mpf(float(max(alpha, 1 - p)))
+    """Gamma(1 - p, alpha) / (m^(1-p) e^-m), m = max(alpha, 1 - p), of which 1 - p is a number that stays while p moves."""
+    m = max(alpha, mpf(float(1 - p)))
     return oracle.upper_gamma(1 - p, alpha) / (m ** (1 - p) * mp.exp(-m))
 
 

@@ -12,7 +12,9 @@ def gaussian(tan2: Float[Array, "..."], alpha: Float[Array, ""]) -> Float[Array,
 
 
 def anisotropic_gaussian(
-    x2: Float[Array, "..."], y2: Float[Array, "..."], cos2: Float[Array, "..."], ax: Float[Array, ""], ay: Float[Array, ""]
+    slope_x2: Float[Array, "..."], slope_y2: Float[Array, "..."], ax: Float[Array, ""], ay: Float[Array, ""]
 ) -> Float[Array, "..."]:
-    """exp(-tan^2 (cos^2 phi/ax^2 + sin^2 phi/ay^2)) / (pi ax ay), from the squared components of h: no azimuth is needed."""
-    return jnp.exp(-(x2 / ax**2 + y2 / ay**2) / cos2) / (jnp.pi * ax * ay)
+    """exp(-tan^2 (cos^2 phi/ax^2 + sin^2 phi/ay^2)) / (pi ax ay), of tan^2 cos^2 phi and tan^2 sin^2 phi: the squared slopes
+    of h, so that no azimuth is needed.
+    """
+    return jnp.exp(-(slope_x2 / ax**2 + slope_y2 / ay**2)) / (jnp.pi * ax * ay)

@@ -22,7 +22,8 @@ class SGD(eqx.Module):
         D = exp(m - x) (m/x)^p / (pi alpha m I (n.m)^4),
 
     for any m > 0. At m = max(alpha, s) the integrand peaks at u = 0 with value 1, so that nothing over- or underflows. As D
-    does not depend on m, no derivative goes through it: those of its factors by m are as large as p/m, and cancel.
+    does not depend on m, no derivative need go through it: none goes through s, which may be tiny (those of the factors are
+    1/s, and cancel); alpha moves, so that x/alpha is 1 at the pole whatever alpha is.
     """
 
     alpha: Float[Array, ""]
@@ -33,15 +34,15 @@ class SGD(eqx.Module):
 
     def reference(self) -> Float[Array, ""]:
         """m."""
-        return jax.lax.stop_gradient(jnp.maximum(self.alpha, 1 - self.p))
+        return jnp.where(self.alpha > 1 - self.p, self.alpha, jax.lax.stop_gradient(1 - self.p))
 
     def integral(self) -> Float[Array, ""]:
         """I, by 128 Gauss-Legendre nodes over the range where the integrand is above e^-45 of its peak."""
         x, weight = (jnp.asarray(a, jnp.result_type(self.alpha)) for a in gauss_legendre(128))
         s, m = 1 - self.p, self.reference()
         # Where the range is cut is no part of the answer: no derivative goes through it.
-        rate = jax.lax.stop_gradient(s)
-        end = jnp.minimum(jnp.log(_tail(m, 45) / m), 45 / jnp.maximum(-rate, 0.1))
+        rate, scale = jax.lax.stop_gradient((s, m))
+        end = jnp.minimum(jnp.log(_tail(scale, 45) / scale), 45 / jnp.maximum(-rate, 0.1))
         start = jnp.maximum(jnp.log(self.alpha / m), -1 - 45 / jnp.maximum(rate, 0.1))
         u = start + x * (end - start)
         return (end - start) * jnp.sum(weight * jnp.exp(s * u - m * jnp.expm1(u)))
