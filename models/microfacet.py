@@ -5,7 +5,6 @@ from __future__ import annotations
 from jaxtyping import Array, Float
 
 
-
 def microfacet(
     ndf: Float[Array, "..."], fresnel: Float[Array, "..."], visibility: Float[Array, "..."]
 ) -> Float[Array, "..."]:

@@ -12,7 +12,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from . import reference
-from .measure import errors, evaluate, not_finite
+from .measure import HELD, errors, evaluate, moved, not_finite
 from .parts import PARTS, Part
 
 Reals = NDArray[np.float64]
@@ -62,6 +62,12 @@ class Record:
     values_not_finite: int
     slopes_not_finite: int
     maps: tuple[Map, ...]
+    beyond: Worst
+    """The largest error of a value or slope where the precision cannot hold it, which ``value`` and ``slope`` leave out."""
+    beyond_moved: float
+    """How far one rounding of the arguments moves the value or slope there, relative."""
+    beyond_share: float
+    """Of the points, those with a value or slope that the precision cannot hold."""
 
 
 def survey(draws: int | None = None, say: Callable[[str], None] = lambda text: None) -> list[Record]:
@@ -111,7 +117,7 @@ def _tabulate(jobs: Points) -> list[tuple[Reals, Reals]]:
 
 def _finite_record(part: Part, precision: str, bad: tuple[int, int], draws: int) -> Record:
     nothing = Worst(0.0, "", {})
-    return Record(part.group, part.name, precision, part.angle, nothing, nothing, 0, draws, *bad, ())
+    return Record(part.group, part.name, precision, part.angle, nothing, nothing, 0, draws, *bad, (), nothing, 0.0, 0.0)
 
 
 def _measured(record: Record, part: Part, plan: list[tuple[str, Reals, Reals]], found: dict[Any, Any]) -> Record:
@@ -124,7 +130,11 @@ def _measured(record: Record, part: Part, plan: list[tuple[str, Reals, Reals]], 
         points = points if double else points.astype(np.float32).astype(np.float64)
         against = want if double and want is not None else evaluate(part, points)
         found = errors(part, points, evaluate(part, points, dtype), against, dtype)
-        seen.append((points, *found))
+        least = np.zeros_like(found[0]), np.zeros_like(found[1])
+        if not double:  # what the best of formulas would err by
+            by_value, by_slope = moved(part, points)
+            least = errors(part, points, (against[0] + by_value, against[1] + by_slope), against, dtype)
+        seen.append((points, *(np.column_stack(both) for both in (found, least))))
         return found
 
     for varied, values, points in plan:
@@ -138,22 +148,29 @@ def _measured(record: Record, part: Part, plan: list[tuple[str, Reals, Reals]], 
         compare(part.drawn(scattered), found[part, "", 0])
     else:
         compare(part.drawn(SCATTERED_SINGLE // (8 if part.integral else 1)), None)
-    points, value, slope = (np.concatenate(a) for a in zip(*seen, strict=True))
+    points, error, least = (np.concatenate(a) for a in zip(*seen, strict=True))  # errors of the value, then of each slope
+    names = ("value", *part.arguments)
+    held = ~(least > HELD)  # NaN, where a slope does not exist, is no limit of the precision
+    value, slope = np.where(held, error, 0)[:, :1], np.where(held, error, 0)[:, 1:]
+    beyond, moved_there = _worst(part, points, np.where(held, 0, error), names, least)
     return replace(
         record,
-        value=_worst(part, points, value[:, None], ("value",)),
-        slope=_worst(part, points, slope, part.arguments),
+        value=_worst(part, points, value, names)[0],
+        slope=_worst(part, points, slope, part.arguments)[0],
         points=len(points),
         maps=tuple(maps),
+        beyond=beyond,
+        beyond_moved=moved_there,
+        beyond_share=float((~held).any(1).mean()),
     )
 
 
-def _worst(part: Part, points: Reals, error: Reals, names: Sequence[str]) -> Worst:
+def _worst(part: Part, points: Reals, error: Reals, names: Sequence[str], least: Reals | None = None) -> tuple[Worst, float]:
+    """The largest of errors ``[n, names]`` and ``least`` there."""
     error = np.where(np.isnan(error), 0, error)
     k, column = np.unravel_index(np.argmax(error), error.shape)
-    return Worst(
-        float(error[k, column]), names[int(column)], {a: float(x) for a, x in zip(part.arguments, points[k], strict=True)}
-    )
+    at = {a: float(x) for a, x in zip(part.arguments, points[k], strict=True)}
+    return Worst(float(error[k, column]), names[int(column)], at), 0.0 if least is None else float(least[k, column])
 
 
 __all__ = ["Map", "Record", "Worst", "survey"]

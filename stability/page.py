@@ -14,8 +14,8 @@ import numpy as np
 
 from ..environment import environment
 from ..files import StrPath, replacing
-from .atlas import Map, Record, survey
-from .measure import LARGEST_SLOPE, SMALLEST_SINGLE
+from .atlas import Map, Record, Worst, survey
+from .measure import HELD, LARGEST_SLOPE, SMALLEST_SINGLE
 
 TITLES = {
     "models": "Models",
@@ -49,7 +49,10 @@ def write_atlas(out_dir: StrPath, draws: int | None = None, say: Callable[[str],
         "draws": draws,
         "finite": all(r.values_not_finite == r.slopes_not_finite == 0 for r in records),
         "slope_end": f"{LARGEST_SLOPE:.0e}",
-        "single_floor": f"{SMALLEST_SINGLE[0]:.0e}",
+        "value_floor": f"{SMALLEST_SINGLE[0]:.0e}",
+        "slope_floor": f"{SMALLEST_SINGLE[1]:.0e}",
+        "held": f"{HELD:.0e}",
+        "beyond": [_beyond(r) for r in records if r.beyond_share],
     }
     for name in ("stability.md", "stability.html"):
         _write(out / name, templates.get_template(f"{name}.j2").render(context).encode())
@@ -63,17 +66,32 @@ def write_atlas(out_dir: StrPath, draws: int | None = None, say: Callable[[str],
     return out / "stability.html"
 
 
+def _where(found: Worst) -> str:
+    at = ", ".join(f"{k} {v:.6g}" for k, v in found.at.items() if not k.startswith(("wi_", "wo_")))
+    return at or "directions only"
+
+
+def _beyond(r: Record) -> dict[str, Any]:
+    return {
+        "name": r.name,
+        "group": TITLES[r.group].lower(),
+        "share": f"{100 * r.beyond_share:.2g} %",
+        "error": f"{r.beyond.error:.1e}",
+        "by": r.beyond.argument,
+        "moved": f"{r.beyond_moved:.1e}",
+        "at": _where(r.beyond),
+    }
+
+
 def _row(r: Record) -> dict[str, Any]:
-    at = ", ".join(f"{k} {v:.6g}" for k, v in r.value.at.items() if not k.startswith(("wi_", "wo_")))
-    slope = ", ".join(f"{k} {v:.6g}" for k, v in r.slope.at.items() if not k.startswith(("wi_", "wo_")))
     return {
         "name": r.name,
         "precision": r.precision,
         "value": f"{r.value.error:.1e}",
-        "at": at or "directions only",
+        "at": _where(r.value),
         "slope": f"{r.slope.error:.1e}",
         "by": r.slope.argument,
-        "slope_at": slope or "directions only",
+        "slope_at": _where(r.slope),
         "points": r.points,
         "draws": r.draws,
         "bad": f"{r.values_not_finite} / {r.slopes_not_finite}",

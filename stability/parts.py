@@ -12,7 +12,7 @@ from jaxtyping import Array
 from numpy.typing import NDArray
 
 from .. import models, special
-from ..geometry import Geometry, from_directions
+from ..geometry import Geometry, from_sums
 from ..models import fresnel, masking, ndf, parameters_of
 from . import domain
 from .domain import GRAZING, Range
@@ -35,7 +35,8 @@ class Part:
     group: str
     name: str
     ranges: dict[str, Range]
-    program: Program
+    formula: Program
+    """Of what float32 rounds first: the parameters and what ``lift`` makes of the other arguments."""
     angle: str
     """What the columns of its maps are."""
     columns: Reals
@@ -50,9 +51,22 @@ class Part:
     """Whether it has no derivative in the directions where n.l = n.v."""
     varied: tuple[str, ...] = ()
     """The arguments that have a map."""
+    lift: Callable[[Array], Array] = lambda x: x
+    """The arguments beyond ``ranges`` as the formula takes them, ``[m]`` to ``[k]``."""
+    whole: Program | None = None
+    """The program that users call, where it is more than the formula of lifted arguments."""
     smallest: tuple[float, float] = (1e-280, 1e-150)
     """Values and slopes below count as zero: they have lost digits to underflow in a product on the way, or the reference
     has none of its own (a reflectance of 0 that it takes from the square of a rounding)."""
+
+    def lifted(self, x: Array) -> Array:
+        """All arguments of ``formula``."""
+        count = len(self.ranges)
+        return jnp.concatenate([x[:count], self.lift(x[count:])])
+
+    def program(self, x: Array) -> Array:
+        """The value at one point."""
+        return self.formula(self.lifted(x)) if self.whole is None else self.whole(x)
 
     @property
     def arguments(self) -> tuple[str, ...]:
@@ -87,6 +101,19 @@ def _aside(turn: float, viewer: float) -> Callable[[Reals], Reals]:
     )
 
 
+def _sums(x: Array) -> Array:
+    """l + v, l - v, n.l and n.v of two directions, which differences next to the mirror direction leave exact."""
+    return jnp.concatenate([x[:3] + x[3:], x[:3] - x[3:], x[2:3], x[5:]])
+
+
+def _geometry(y: Array) -> Geometry:
+    return from_sums(y[:3], y[3:6], y[6], y[7])
+
+
+def _sine_cosine(x: Array) -> Array:
+    return jnp.concatenate([jnp.sin(x), jnp.cos(x)])
+
+
 def _angle(theta: Reals) -> Reals:
     return theta[:, None]
 
@@ -116,9 +143,13 @@ def _model(cls: type[models.BRDF], integral: bool) -> Part:
     specs = parameters_of(cls)
     count = len(specs)
 
-    def program(x: Array) -> Array:
+    def whole(x: Array) -> Array:
         numbers = {p.name: x[k][None] if p.per_channel else x[k] for k, p in enumerate(specs)}
         return cls(**numbers)(x[count : count + 3], x[count + 3 :])[0]
+
+    def formula(y: Array) -> Array:
+        g = _geometry(y[count:])
+        return jnp.broadcast_to(cls(**{p.name: y[k] for k, p in enumerate(specs)}).evaluate(g), g.shape)
 
     name = cls.__name__
     ranges = domain.PARAMETERS[name]
@@ -129,7 +160,7 @@ def _model(cls: type[models.BRDF], integral: bool) -> Part:
         "models",
         name,
         {p.name: ranges[p.name] for p in specs},
-        program,
+        formula,
         "polar angle of the light",
         POLAR,
         place,
@@ -138,6 +169,8 @@ def _model(cls: type[models.BRDF], integral: bool) -> Part:
         integral,
         kinked=name in ("ABC", "AshikhminShirley", "AshikhminShirleyAnisotropic"),
         varied=shapes or ("diffuse",),
+        lift=_sums,
+        whole=whole,
         smallest=_REFLECTANCE if "ior" in ranges else Part.smallest,
     )
 
@@ -146,34 +179,36 @@ def _ndf(name: str, shape: str, density: Callable[..., Any]) -> Part:
     """A density of theta_m, ``density(*parameters, sin^2, cos^2)``."""
     ranges = domain.SHAPES[shape]
 
-    def program(x: Array) -> Array:
-        out: Array = density(*x[:-1], jnp.sin(x[-1]) ** 2, jnp.cos(x[-1]) ** 2)
+    def formula(y: Array) -> Array:
+        out: Array = density(*y[:-2], y[-2] ** 2, y[-1] ** 2)
         return out
 
-    return Part("ndf", name, ranges, program, "theta_m", LOBE, _angle, _any_angle, ("theta",), varied=tuple(ranges))
+    varied, extra = tuple(ranges), ("theta",)
+    return Part("ndf", name, ranges, formula, "theta_m", LOBE, _angle, _any_angle, extra, varied=varied, lift=_sine_cosine)
 
 
 def _anisotropic(name: str, shape: str, density: Callable[..., Any]) -> Part:
     """A density of the half vector, ``density(*parameters, geometry)``."""
     ranges = domain.SHAPES[shape]
 
-    def program(x: Array) -> Array:
-        out: Array = density(*x[:-6], from_directions(x[-6:-3], x[-3:]))
+    def formula(y: Array) -> Array:
+        out: Array = density(*y[:-8], _geometry(y[-8:]))
         return out
 
     place, scatter = _aside(0.3, 0.8), domain.draw_directions
-    angle = "polar angle of the light"
-    return Part("ndf", name, ranges, program, angle, POLAR, place, scatter, DIRECTIONS, varied=tuple(ranges))
+    angle, varied = "polar angle of the light", tuple(ranges)
+    return Part("ndf", name, ranges, formula, angle, POLAR, place, scatter, DIRECTIONS, varied=varied, lift=_sums)
 
 
 def _smith(shape: str, lobe: type) -> Part:
-    def program(x: Array) -> Array:
-        return x[2] / (x[2] + masking.averted_area(lobe(x[0], x[1]), x[2]))
+    def formula(y: Array) -> Array:
+        """Projected area of the facets that face the viewer, n.v/G1: what models divide by, and regular at grazing."""
+        return y[2] + masking.averted_area(lobe(y[0], y[1]), y[2])
 
     ranges = domain.SHAPES[shape]
     angle, name = "polar angle", f"Smith, {shape}"
     return Part(
-        "masking", name, ranges, program, angle, POLAR, _cosine, _any_cosine, ("cosine",), True, varied=tuple(ranges)
+        "masking", name, ranges, formula, angle, POLAR, _cosine, _any_cosine, ("cosine",), True, varied=tuple(ranges)
     )
 
 
@@ -181,9 +216,9 @@ def _fresnel(name: str) -> Part:
     ranges = domain.FRESNEL[name]
     function = getattr(fresnel, name)
 
-    def program(x: Array) -> Array:
-        cosine, one = jnp.cos(x[-1]), jnp.ones_like(x[-1])
-        out: Array = function(*x[:-1], Geometry(one, one, one, 0 * one, cosine, jnp.sin(x[-1]) ** 2))
+    def formula(y: Array) -> Array:
+        one = jnp.ones_like(y[-1])
+        out: Array = function(*y[:-2], Geometry(one, one, one, 0 * one, y[-1], y[-2] ** 2))
         return out
 
     varied, extra = tuple(ranges)[:1], ("theta",)
@@ -191,18 +226,19 @@ def _fresnel(name: str) -> Part:
         "fresnel",
         name,
         ranges,
-        program,
+        formula,
         "theta_d",
         LOBE,
         _angle,
         _any_angle,
         extra,
         varied=varied,
+        lift=_sine_cosine,
         smallest=_REFLECTANCE if name == "dielectric" else Part.smallest,
     )
 
 
-def _special(name: str, ranges: dict[str, Range], program: Program, second: str, columns: Reals) -> Part:
+def _special(name: str, ranges: dict[str, Range], formula: Program, second: str, columns: Reals) -> Part:
     """A function of its ranges and, where ``second`` names one, of an argument that runs along the columns."""
     extra = (second,) if second else ()
 
@@ -212,7 +248,7 @@ def _special(name: str, ranges: dict[str, Range], program: Program, second: str,
     def scatter(rng: np.random.Generator, n: int) -> Reals:
         return domain.draw({second: domain.PARAMETERS["SGD"]["p"]}, rng, n) if second else np.empty((n, 0))
 
-    return Part("special", name, ranges, program, second or "any", columns, place, scatter, extra, varied=tuple(ranges)[:1])
+    return Part("special", name, ranges, formula, second or "any", columns, place, scatter, extra, varied=tuple(ranges)[:1])
 
 
 _NO_COLUMNS = np.zeros(1)
@@ -234,7 +270,7 @@ PARTS: tuple[Part, ...] = (
     _anisotropic(
         "anisotropic_gaussian",
         "WardAnisotropic",
-        lambda ax, ay, g: ndf.anisotropic_gaussian(g.tangential()[0], g.tangential()[1], g.cos2_h, ax, ay),
+        lambda ax, ay, g: ndf.anisotropic_gaussian(g.slopes()[0], g.slopes()[1], ax, ay),
     ),
     _smith("GTR", ndf.GTR),
     _smith("SGD", ndf.SGD),
@@ -242,13 +278,14 @@ PARTS: tuple[Part, ...] = (
         "masking",
         "vcavity",
         {},
-        lambda x: masking.vcavity(from_directions(x[:3], x[3:])),
+        lambda y: masking.vcavity(_geometry(y)),
         "polar angle of the light",
         POLAR,
         _aside(0.3, 0.8),
         domain.draw_directions,
         DIRECTIONS,
         kinked=True,
+        lift=_sums,
     ),
     *(_fresnel(name) for name in domain.FRESNEL),
     _special("expm1_ratio", {"x": _EXPM1}, lambda x: special.expm1_ratio(x[0]), "", _NO_COLUMNS),

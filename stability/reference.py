@@ -36,8 +36,8 @@ REFERENCES: dict[str, dict[str, Callable[..., Any]]] = {
         "anisotropic_gaussian": lambda ax, ay, *x: oracle.ward_lobe(ax, ay, x[:3], x[3:]),
     },
     "masking": {
-        "Smith, GTR": oracle.gtr_masking,
-        "Smith, SGD": oracle.sgd_masking,
+        "Smith, GTR": lambda alpha, gamma, cosine: cosine / oracle.gtr_masking(alpha, gamma, cosine),
+        "Smith, SGD": lambda alpha, p, cosine: cosine / oracle.sgd_masking(alpha, p, cosine),
         "vcavity": lambda *x: oracle.vcavity(x[:3], x[3:]) / (4 * x[2] * x[5]),
     },
     "fresnel": {

@@ -271,7 +271,7 @@ ANISOTROPIC_NDFS = {"power_cosine_anisotropic": "power_cosine", "anisotropic_gau
 """Each with the isotropic density that it equals for equal widths."""
 
 PARTS = {
-    masking: {"smith_correlated", "smith_lambda", "smith_separable", "vcavity"},
+    masking: {"averted_area", "smith_correlated", "smith_lambda", "smith_separable", "vcavity"},
     fresnel: {"dielectric", "dielectric_f0", "schlick", "sgd_fresnel"},
 }
 """Parts with a test of their own, in test_masking.py and in test_fresnel of test_models.py, by package."""

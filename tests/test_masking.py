@@ -83,7 +83,8 @@ def test_correlated_and_separable():
         g = from_directions(cases.WI, cases.WO)
         lobe = ndf.GTR(jnp.asarray(0.4), jnp.asarray(2.0))
         light, viewer = ((np.sqrt(1 + 0.16 * (1 / c**2 - 1)) - 1) / 2 for c in (cases.WI[:, 2], cases.WO[:, 2]))
-        correlated, separable = masking.smith_correlated(lobe, g), masking.smith_separable(lobe, g)
+        over = 4 * g.cos_i * g.cos_o
+        correlated, separable = over * masking.smith_correlated(lobe, g), over * masking.smith_separable(lobe, g)
     # 1e-12: the closed form as written here cancels near normal incidence
     np.testing.assert_allclose(correlated, 1 / (1 + light + viewer), rtol=1e-12)
     np.testing.assert_allclose(separable, 1 / ((1 + light) * (1 + viewer)), rtol=1e-12)
@@ -91,12 +92,12 @@ def test_correlated_and_separable():
 
 
 def test_vcavity():
-    """min(1, 2 n.h n.v/c_d, 2 n.h n.l/c_d) from the directions (Cook & Torrance 1982)."""
+    """min(1, 2 n.h n.v/c_d, 2 n.h n.l/c_d) from the directions (Cook & Torrance 1982), over 4 n.l n.v."""
     with jax.enable_x64(True):
-        got = masking.vcavity(from_directions(cases.WI, cases.WO))
+        got = 4 * cases.WI[:, 2] * cases.WO[:, 2] * masking.vcavity(from_directions(cases.WI, cases.WO))
     h = cases.WI + cases.WO
     h /= np.linalg.norm(h, axis=1, keepdims=True)
     cd = np.sum(h * cases.WI, 1)
     want = np.minimum(1, 2 * h[:, 2] * np.minimum(cases.WI[:, 2], cases.WO[:, 2]) / cd)
-    # 1e-10: c_d of the plain product has no more digits where both directions graze, 1e-16/c_d^2
+    # c_d of the plain product has no more digits where both directions graze at 89.995 degrees: 1e-16/c_d^2 = 1e-8
     np.testing.assert_allclose(got, want, rtol=1e-7)

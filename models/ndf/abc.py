@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import equinox as eqx
 import jax.numpy as jnp
+import numpy as np
 from jaxtyping import Array, Float
 
 from ...quadrature import gauss_legendre
@@ -34,6 +35,6 @@ class ABC(eqx.Module):
         """D in 1/sr."""
         # Guard: the slope of the root is infinite on the horizon, where Smith's integral ends at normal incidence; its
         # second power of 3/2 must fit into float32 (tests/test_masking.py::test_normal_incidence).
-        cosine = jnp.sqrt(jnp.maximum(cos2, float(jnp.finfo(jnp.result_type(cos2)).tiny) ** 0.5))
+        cosine = jnp.sqrt(jnp.maximum(cos2, float(np.finfo(np.dtype(jnp.result_type(cos2))).tiny) ** 0.5))
         vers = sin2 / (1 + cosine)
         return self.normalisation() * jnp.exp(-self.c * jnp.log1p(self.b * vers))

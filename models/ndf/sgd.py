@@ -54,11 +54,17 @@ class SGD(eqx.Module):
         # and 0 * inf = NaN (tests/test_ndf.py::test_sgd_at_the_horizon).
         lost = sin2 > jax.lax.stop_gradient(self.alpha * _tail(m, 1000)) * cos2
         sin2, cos2 = jnp.where(lost, 0, sin2), jnp.where(lost, 1, cos2)
-        x = self.alpha + sin2 / cos2 / self.alpha
+        tail = sin2 / cos2 / self.alpha
+        x = self.alpha + tail
         # Guard: reciprocals, because the derivative of a quotient a/b forms a db, 1e-40 here, below float32
         # (tests/test_ndf.py::test_sgd_slopes_in_single_precision).
         k = 1 / (jnp.pi * self.alpha) * (1 / (m * self.integral()))
-        return jnp.where(lost, 0, jnp.exp(m - x - self.p * jnp.log(x / m)) * k / cos2**2)
+        ratio = x / m
+        # what the rounding of 1 + small leaves out, which p multiplies
+        rest = jnp.where(ratio > 0.5, (((self.alpha - m) + tail) / m - (ratio - 1)) / ratio, 0)
+        log_ratio = jnp.log(ratio) + jax.lax.stop_gradient(rest)
+        half = jnp.exp(((m - self.alpha) - tail - self.p * log_ratio) / 2)  # k may be 1e25 where exp is below float32
+        return jnp.where(lost, 0, k * half * half / cos2**2)
 
 
 def _tail(m: Float[Array, ""], a: float) -> Float[Array, ""]:
