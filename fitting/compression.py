@@ -9,9 +9,12 @@ make k cells do the work of all of them, with no cell left out:
 - p - q has degree below k, so that k-point Gauss quadrature *for that measure* gives its weighted square sum exactly
   (Golub & Welsch 1969; Gautschi 2004, theorem 1.45).
 
-So each row becomes k ordinary cells, at the Gauss nodes with the Gauss weights and the value of q, and the constant. Masks
-and uneven weights are part of the measure; a row with fewer than k fitted cells keeps them as they are. What is lost is
-only what T(f) has beyond degree k - 1 in phi_d: the exact table judges that at the solution.
+So each row becomes a few ordinary cells, at the Gauss nodes with the Gauss weights and the value of q, and the constant.
+Masks and uneven weights are part of the measure; a row with fewer fitted cells than nodes keeps them as they are. What is
+lost is only what T(f) has beyond degree k - 1 in phi_d: the exact table judges that at the solution.
+
+At phi_d = 90 degrees light and viewer change places, and with them the two sides of every max(n.l, n.v): many models have a
+kink there, which no polynomial across it follows. Each half of a row therefore has its own polynomial and its own rule.
 """
 
 from __future__ import annotations
@@ -71,15 +74,24 @@ class RowRules:
         return out.reshape(c, h, d, k), kept
 
 
+MIDDLE = np.pi / 2 + 1e-9
+"""Where light and viewer change places: the end of the first half of a row, rounding included."""
+
+
 def row_rules(phi: Reals, weight: Reals, k: int) -> RowRules:
-    """The k-point rules of the rows of weights ``[H, D, P]`` at ``phi`` ``[P]`` in [0, pi]."""
+    """The rules of the rows of weights ``[H, D, P]`` at ``phi`` ``[P]`` in [0, pi], k points in all."""
     scale = weight.max(-1)
     # rounded: the steps of a grid differ in their last bits
     relative = np.round(weight / np.where(scale > 0, scale, 1.0)[..., None], 12)
     flat = np.ascontiguousarray(relative.reshape(-1, relative.shape[-1]))
     bytes_of_row = flat.view(np.dtype((np.void, flat.dtype.itemsize * flat.shape[1])))[:, 0]
     _, first, pattern = np.unique(bytes_of_row, return_index=True, return_inverse=True)
-    return RowRules(pattern.reshape(scale.shape), scale, *_rules(phi, flat[first], k))
+    half = k - k // 2
+    near, far = _rules(phi, flat[first] * (phi <= MIDDLE), half), _rules(phi, flat[first] * (phi > MIDDLE), k // 2)
+    nodes, weights, analysis = (np.concatenate([near[i], far[i]], -1) for i in range(3))
+    synthesis = np.zeros((len(first), k, k))
+    synthesis[:, :half, :half], synthesis[:, half:, half:] = near[3], far[3]
+    return RowRules(pattern.reshape(scale.shape), scale, nodes, weights, analysis, synthesis)
 
 
 def _rules(phi: Reals, weight: Reals, k: int) -> tuple[Reals, Reals, Reals, Reals]:

@@ -28,7 +28,11 @@ Map = Callable[[Scalars], Scalars]
 
 @dataclass(frozen=True)
 class Coordinate:
-    """One coordinate: the parameter it stands for in messages, its box, and whether the BRDF is affine in it."""
+    """One coordinate: the parameter it stands for in messages, its box, and whether the BRDF is affine in it.
+
+    A shared coordinate ``folds`` if the shape that it makes turns back inside its box: the derivative vanishes there, and
+    an optimum beyond the turn lies where it does.
+    """
 
     name: str
     parameter: str
@@ -36,6 +40,7 @@ class Coordinate:
     lower: float
     upper: float
     linear: bool
+    folds: bool = False
 
 
 @dataclass(frozen=True)
@@ -164,7 +169,8 @@ def _gtr_chart(narrow: bool) -> Chart:
 def _abc_chart() -> Chart:
     """The lobe's scale by specular F(0), and ior - 1 by its logarithm.
 
-    F(0) runs from 1e-7 to 1 with the index; specular alone would have to run against it by as much.
+    F(0) runs from 1e-7 to 1 with the index; specular alone would have to run against it by as much. F/F(0) rises less and
+    less towards grazing up to an index of about 9 and more again beyond it, where conductors would lie: there it folds.
     """
     plain = plain_chart(ABC)
 
@@ -187,7 +193,9 @@ def _abc_chart() -> Chart:
             "ior": jnp.log(p["ior"] - 1),
         }
 
-    return _rewritten(plain, to_parameters, from_parameters, ior=(float(np.log(1e-3)), float(np.log(1e3))))
+    chart = _rewritten(plain, to_parameters, from_parameters, ior=(float(np.log(1e-3)), float(np.log(1e3))))
+    coordinates = tuple(replace(c, folds=c.name == "ior") for c in chart.coordinates)
+    return replace(chart, coordinates=coordinates)
 
 
 def _sgd_chart() -> Chart:

@@ -9,7 +9,7 @@ Where the loss treats channels separately, G falls into one small matrix a chann
 
 from __future__ import annotations
 
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from dataclasses import replace
 from functools import partial
 from typing import Any, NamedTuple
@@ -55,21 +55,24 @@ class Problem(eqx.Module):
         return self.channels * len(self.chart.channel) + len(self.chart.shared)
 
 
-def _columns(function: Callable[[list[Array]], tuple[Array, Array]], x: list[Array]) -> tuple[list[Array], Array, Array]:
-    """Columns of the Jacobian of the first value, one forward derivative each, and both values.
+def _columns(
+    function: Callable[[list[Array]], tuple[Array, Array]], x: list[Array], twice: Sequence[int] = ()
+) -> tuple[list[Array], Array, Array]:
+    """Columns of the Jacobian of the first value, one forward derivative each, second derivatives by the coordinates
+    ``twice``, and both values.
 
     Coordinates are separate scalars and each derivative is taken with the others held, so that what a coordinate does not
     touch is absent from its program, and what channels share is computed once for all of them. The compiler finds the
     copies of the values equal.
     """
-    columns = []
-    for k in range(len(x)):
 
-        def along(t: Array, k: int = k) -> tuple[Array, Array]:
-            return function([*x[:k], t, *x[k + 1 :]])
+    def slope(k: int, t: Array) -> Array:
+        along = jax.jvp(lambda t: function([*x[:k], t, *x[k + 1 :]]), (t,), (jnp.ones_like(t),))
+        tangent: Array = along[1][0]
+        return tangent
 
-        _, (tangent, _) = jax.jvp(along, (x[k],), (jnp.ones_like(x[k]),))
-        columns.append(tangent)
+    columns = [slope(k, t) for k, t in enumerate(x)]
+    columns += [jax.jvp(partial(slope, k), (x[k],), (jnp.ones_like(x[k]),))[1] for k in twice]
     return columns, *function(x)
 
 
@@ -180,16 +183,21 @@ def _joint_residual(
 
 
 def channel_rows(
-    problem: Problem, x: Vector, tables: _Tables, g: Geometry, measured: Array, weight: Array
-) -> tuple[Float[Array, "C k+s+1 *cells"], Float[Array, "C *cells"]]:
-    """Weighted rows [J r] of a block, channel by channel, for a loss that treats channels separately; and the values."""
+    problem: Problem, x: Vector, tables: _Tables, g: Geometry, measured: Array, weight: Array, twice: Sequence[int] = ()
+) -> tuple[Float[Array, "C k+s+q+1 *cells"], Float[Array, "C *cells"]]:
+    """Weighted rows [J r] of a block, channel by channel, for a loss that treats channels separately; and the values.
+
+    Between J and r lie the second derivatives by the q shared coordinates ``twice``, counted among the shared ones.
+    """
     chart, loss = problem.chart, problem.loss
     own, shared = chart.split(x, problem.channels)
     root = _root_weight(loss, g, weight)
 
     def one(own_c: Vector, tables_c: _Tables, measured_c: Array) -> tuple[Array, Array]:
         columns, r, f = _columns(
-            lambda y: _channel_residual(chart, y, tables_c, measured_c, g, loss, root), [*own_c, *shared]
+            lambda y: _channel_residual(chart, y, tables_c, measured_c, g, loss, root),
+            [*own_c, *shared],
+            [len(own_c) + i for i in twice],
         )
         return jnp.stack([*(jnp.broadcast_to(c, r.shape) for c in columns), r]), f
 
@@ -198,12 +206,16 @@ def channel_rows(
 
 
 def joint_rows(
-    problem: Problem, x: Vector, tables: _Tables, g: Geometry, measured: Array, weight: Array
-) -> tuple[Float[Array, "n+1 m *cells"], Float[Array, "C *cells"]]:
-    """Weighted rows [J r] of a block for a loss of any form, m residuals a cell; and the values."""
+    problem: Problem, x: Vector, tables: _Tables, g: Geometry, measured: Array, weight: Array, twice: Sequence[int] = ()
+) -> tuple[Float[Array, "n+q+1 m *cells"], Float[Array, "C *cells"]]:
+    """As :func:`channel_rows`, of all channels at once, for a loss of any form; m residuals a cell."""
     root = _root_weight(problem.loss, g, weight)
     form = problem.chart, problem.channels
-    columns, r, f = _columns(lambda y: _joint_residual(form, y, tables, measured, g, problem.loss, root), list(x))
+    columns, r, f = _columns(
+        lambda y: _joint_residual(form, y, tables, measured, g, problem.loss, root),
+        list(x),
+        [problem.size - len(problem.chart.shared) + i for i in twice],
+    )
     return jnp.stack([*columns, r]), f
 
 
@@ -224,9 +236,10 @@ def _band_products(rows: Float[Array, "m *cells"], samples: Samples) -> Float[Ar
 
 def _scatter(problem: Problem, per_channel: Float[Array, "C ... k k"]) -> Float[Array, "... n+1 n+1"]:
     """The full Gram matrix from those of the channels."""
-    n, k, c = problem.size, len(problem.chart.channel), problem.channels
-    tail = np.arange(c * k, n + 1)
-    out = jnp.zeros((*per_channel.shape[1:-2], n + 1, n + 1))
+    k, c = len(problem.chart.channel), problem.channels
+    size = c * k + per_channel.shape[-1] - k
+    tail = np.arange(c * k, size)
+    out = jnp.zeros((*per_channel.shape[1:-2], size, size))
     for i in range(c):
         at = np.concatenate([np.arange(i * k, (i + 1) * k), tail])
         out = out.at[..., at[:, None], at].add(per_channel[i])
@@ -263,15 +276,28 @@ def _sum_over_blocks(samples: Samples, span: Span, one: Callable[[Geometry, Arra
     )
 
 
-@eqx.filter_jit  # a solver's program asks for it in several places: it is traced once
 def gram(problem: Problem, x: Vector, span: Span) -> Float[Array, "n+1 n+1"]:
     """G = [J r]^T [J r] over a span of blocks; its last element is the cost, with what compression left out."""
+    return _gram(problem, x, span, ())
+
+
+def curved_gram(problem: Problem, x: Vector, span: Span) -> tuple[Float[Array, "n+1 n+1"], Float[Array, "q"]]:
+    """G, and sum w r d^2r/dx^2 of the q coordinates that fold."""
+    folds = [i for i, c in enumerate(problem.chart.shared) if c.folds]
+    n, q = problem.size, len(folds)
+    g = _gram(problem, x, span, tuple(folds))
+    kept = np.array([*range(n), n + q])
+    return g[kept[:, None], kept], g[n : n + q, -1]
+
+
+@eqx.filter_jit
+def _gram(problem: Problem, x: Vector, span: Span, twice: tuple[int, ...]) -> Float[Array, "n+q+1 n+q+1"]:
     tables = polar_tables(problem, x)
 
     def one(g: Geometry, measured: Array, weight: Array) -> Array:
         if problem.loss.separable:
-            return jax.vmap(_products)(channel_rows(problem, x, tables, g, measured, weight)[0])
-        return _products(joint_rows(problem, x, tables, g, measured, weight)[0])
+            return jax.vmap(_products)(channel_rows(problem, x, tables, g, measured, weight, twice)[0])
+        return _products(joint_rows(problem, x, tables, g, measured, weight, twice)[0])
 
     total: Array = _sum_over_blocks(problem.samples, span, one)
     if problem.loss.separable:
@@ -332,17 +358,23 @@ def factor(g: Float[Array, "m m"]) -> Float[Array, "m m"]:
 def gram_residual(problem: Problem, span: Span) -> Callable[[Vector], Array]:
     """The table as a residual of n + 1 rows with an exact Jacobian.
 
+    Where a coordinate folds (:class:`~brdfit.fitting.coordinates.Coordinate`) its column of J vanishes and J^T J knows
+    nothing of the curvature sum r r'' of the cost. A further row, of residual 0 and slope sqrt(sum r r''), says it.
+
     A trial point where the residual is not a number (1 + f cos <= 0 under ``log``) has infinite cost: it is rejected, and
     the factors of a finite matrix are returned in its place so that no NaN reaches the solver.
     """
     # traced here, once: inside a solver every use of it would be
-    one_pass: Any = eqx.filter_closure_convert(partial(gram, problem, span=span), jnp.zeros(problem.size))
+    one_pass: Any = eqx.filter_closure_convert(partial(curved_gram, problem, span=span), jnp.zeros(problem.size))
+    first = problem.size - len(problem.chart.shared)
+    folds = np.array([first + i for i, c in enumerate(problem.chart.shared) if c.folds], int)
 
     def whiten(x: Vector) -> Array:
-        g = one_pass(x)
-        ok = jnp.all(jnp.isfinite(g))
+        g, curvature = one_pass(x)
+        ok = jnp.all(jnp.isfinite(g)) & jnp.all(jnp.isfinite(curvature))
         g = jnp.where(ok, g, jnp.eye(g.shape[0]))
-        return jnp.where(ok, 1.0, 1e150) * factor(g)
+        rows = jnp.zeros((len(folds), len(g))).at[np.arange(len(folds)), folds].set(jnp.sqrt(jnp.maximum(curvature, 0.0)))
+        return jnp.concatenate([jnp.where(ok, 1.0, 1e150) * factor(g), jnp.where(ok, rows, 0.0)])
 
     @jax.custom_jvp
     def residual(x: Vector) -> Array:

@@ -34,8 +34,8 @@ def test_paths_agree_at_the_optimum(table):
 
 
 def test_more_nodes_are_closer(table):
-    """The error of compression falls faster than any power of the number of nodes: from 3 to 6 by far more than 10."""
-    few, more = (brdfit.fit(table, "ward", effort=Effort(path="compressed", nodes=k)) for k in (3, 6))
+    """The error of compression falls faster than any power of the number of nodes: from 4 to 8 by far more than 10."""
+    few, more = (brdfit.fit(table, "ward", effort=Effort(path="compressed", nodes=k)) for k in (4, 8))
     assert few.path == more.path == "compressed"
     assert more.shift < few.shift / 10
 
@@ -52,9 +52,9 @@ def test_a_subsample_is_worse_and_says_so(table):
 
 
 def test_fewer_starts(table):
-    one, seven = (brdfit.fit(table, "gtr", effort=Effort(starts=k)) for k in (1, 7))
-    assert sum(o.starts for o in one.optima) < sum(o.starts for o in seven.optima)
-    assert one.errors["log"] >= seven.errors["log"] * (1 - 1e-9)
+    one, more = (brdfit.fit(table, "gtr", effort=Effort(starts=k)) for k in (1, 5))
+    assert sum(o.starts for o in one.optima) < sum(o.starts for o in more.optima)
+    assert one.errors["log"] >= more.errors["log"] * (1 - 1e-9)
 
 
 def test_result_remembers(table):

@@ -8,8 +8,9 @@ import jax.numpy as jnp
 import numpy as np
 import pytest
 from brdfit.data.synthetic import Missing, Relative, generate, material
+from brdfit.fitting.compression import row_rules
 from brdfit.fitting.coordinates import charts
-from brdfit.fitting.gram import Problem, Span, factor, gram, gram_residual, statistics
+from brdfit.fitting.gram import Problem, Span, curved_gram, factor, gram, gram_residual, statistics
 from brdfit.fitting.losses import LOSSES, named_loss
 from brdfit.fitting.samples import compress, samples
 from brdfit.fitting.solver import Box, minimise
@@ -127,6 +128,44 @@ def test_linear_means_linear(name, cls):
             assert straight.all() == coordinate.linear, coordinate.name
             seen += coordinate.linear
         assert seen >= 1
+
+
+@pytest.mark.parametrize("loss", ["log", luminance], ids=["log", "luminance"])
+def test_curvature_where_a_coordinate_folds(loss):
+    """sum w r r'' of abc's index against second derivatives of the dense residual, and as a further row of the problem."""
+    with jax.enable_x64(True):
+        problem, x = problem_of("abc", MODELS["abc"][0], loss)
+        along = jnp.zeros_like(x).at[-1].set(1.0)
+        assert problem.chart.shared[-1].folds
+        slope = lambda y: jax.jvp(lambda z: dense_rows(problem, z), (y,), (along,))[1]  # noqa: E731
+        bend = jax.jit(lambda y: jnp.sum(dense_rows(problem, y) * jax.jvp(slope, (y,), (along,))[1]))
+        span = Span.cells(problem.samples)
+        matrix, curvature = curved_gram(problem, x, span)
+        np.testing.assert_allclose(matrix, gram(problem, x, span), rtol=1e-12, atol=1e-14)
+        # r'' itself is some hundred times its sum with r
+        np.testing.assert_allclose(curvature, [bend(x)], rtol=1e-9)
+        residual = gram_residual(problem, span)
+        z, jac = residual(x), jax.jacfwd(residual)(x)
+        want = np.array(matrix)
+        np.testing.assert_allclose(jac.T @ z, want[:-1, -1], rtol=1e-8, atol=1e-14)
+        want[len(x) - 1, len(x) - 1] += max(float(curvature[0]), 0.0)
+        np.testing.assert_allclose(jac.T @ jac, want[:-1, :-1], rtol=1e-8, atol=1e-13)
+
+
+def test_a_kink_where_light_and_viewer_change_places():
+    """max(n.l, n.v) bends at phi_d = 90 degrees: a row whose values are a polynomial on either side is kept exactly."""
+    rng = np.random.default_rng(0)
+    phi = (np.arange(60) + 0.5) * np.pi / 60
+    weight = rng.uniform(0.5, 1, (2, 3, 60)) * (rng.uniform(size=(2, 3, 60)) > 0.2)
+    rules = row_rules(phi, weight, 8)
+
+    def values(at):
+        return (1 + at + np.where(at < np.pi / 2, 0.0, (at - np.pi / 2) - 3 * (at - np.pi / 2) ** 3))[None]
+
+    reduced, kept = rules.compress(values(phi) * np.ones((1, 2, 3, 60)), slice(None))
+    np.testing.assert_allclose(reduced, values(rules.phi), rtol=1e-12)
+    np.testing.assert_allclose(kept, (weight * values(phi) ** 2).sum(), rtol=1e-12)
+    np.testing.assert_allclose((rules.weight * values(rules.phi)[0] ** 2).sum(), kept[0], rtol=1e-12)
 
 
 def test_compressed_is_not_summed_twice():
