@@ -22,7 +22,7 @@ class Effort:
     cells: float = 1.0
     """Share of the table that an exact search looks at, in (0, 1]: below 1 it is a subsample. Error bars and errors are
     always those of all cells."""
-    starts: int = 4
+    starts: int = 5
     """How many starts are polished after their colours were fitted, of each chart; at least 1."""
     rtol: float = 1e-9
     """Relative decrease of the cost in a step below which the last search ends, in (0, 1)."""

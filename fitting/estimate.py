@@ -72,7 +72,8 @@ def judge(problem: Problem, x: Reals, box: Box, losses: tuple[Loss, ...]) -> Jud
     parameters = {p.name: np.asarray(values[p.name]) if p.per_channel else np.asarray(values[p.name])[0] for p in specs}
     rows = [(p.name, k) for p in specs for k in (range(channels) if p.per_channel else (None,))]
     jacobian = np.stack([np.asarray(slopes[name])[k or 0] for name, k in rows])
-    statistical, jackknife = (jacobian @ c @ jacobian.T for c in (u.statistical, u.jackknife))
+    roots = [jacobian @ a for a in (u.statistical, u.jackknife)]
+    statistical, jackknife = (a @ a.T for a in roots)
     unknown = (np.abs(jacobian) * u.undetermined).sum(1) > 0
     at = {p.name: [i for i, r in enumerate(rows) if r[0] == p.name] for p in specs}
 

@@ -22,7 +22,9 @@ matrix is a sum of squares accurate to about 1e-13 of its diagonal."""
 
 @dataclass(frozen=True)
 class Uncertainty:
-    """Covariance matrices in coordinates; rows of coordinates that are held are 0."""
+    """Covariance matrices A A^T in coordinates by their factors A ``[n, m]``, because a variance formed as a sum of squares
+    is never negative; rows of coordinates that are held are 0.
+    """
 
     statistical: Reals
     jackknife: Reals
@@ -37,7 +39,7 @@ def uncertainty(bands: Reals, middle: Reals, moving: NDArray[np.bool_]) -> Uncer
     n = middle.shape[0]
     total = bands.sum(0)
     undetermined = np.zeros(n, bool)
-    statistical, jackknife, shift = np.zeros((n, n)), np.zeros((n, n)), np.zeros(n)
+    statistical, jackknife, shift = np.zeros((n, n)), np.zeros((n, 1)), np.zeros(n)
     moving = moving & np.isfinite(total).all(0)[:n]
     undetermined |= moving & ~(np.diag(total)[:n] > 0)
     at = np.flatnonzero(moving & ~undetermined)
@@ -45,14 +47,14 @@ def uncertainty(bands: Reals, middle: Reals, moving: NDArray[np.bool_]) -> Uncer
         return Uncertainty(statistical, jackknife, undetermined, shift)
     inverse, null = _pseudo_inverse(total[np.ix_(at, at)])
     undetermined[at] = null
-    statistical[np.ix_(at, at)] = inverse @ middle[np.ix_(at, at)] @ inverse
+    statistical[np.ix_(at, at)] = inverse @ _root(middle[np.ix_(at, at)])
     used = bands[bands[:, :n, :n].trace(axis1=1, axis2=2) > 0]
     steps = np.stack([_delete(total - band, at) for band in used]) if len(used) > 1 else np.zeros((1, len(at)))
     deviation = steps - steps.mean(0)
     count = len(steps)
-    jackknife[np.ix_(at, at)] = (count - 1) / count * deviation.T @ deviation
-    # rounding takes a variance of 0 below it (tests/test_hostile.py::test_hostile_tables)
-    errors = np.sqrt(np.maximum(np.diag(statistical)[at], 0.0))
+    jackknife = np.zeros((n, count))
+    jackknife[at] = np.sqrt((count - 1) / count) * deviation.T
+    errors = np.linalg.norm(statistical[at], axis=1)
     step = np.abs(_delete(total, at))
     with np.errstate(divide="ignore", invalid="ignore"):
         shift[at] = np.where(step > 0, step / errors, 0.0)
@@ -64,6 +66,15 @@ def _delete(rest: Reals, at: NDArray[np.int64]) -> Reals:
     inverse, _ = _pseudo_inverse(rest[np.ix_(at, at)])
     step: Reals = -inverse @ rest[at, -1]
     return step
+
+
+def _root(matrix: Reals) -> Reals:
+    """A with A A^T = matrix, positive semidefinite up to rounding."""
+    diagonal = np.diag(matrix)
+    scale = np.sqrt(np.where(diagonal > 0, diagonal, 1.0))
+    values, vectors = np.linalg.eigh(matrix / scale[:, None] / scale)
+    root: Reals = scale[:, None] * vectors * np.sqrt(np.maximum(values, 0.0))
+    return root
 
 
 def _pseudo_inverse(matrix: Reals) -> tuple[Reals, NDArray[np.bool_]]:
