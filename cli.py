@@ -226,6 +226,42 @@ def stability_command(out_dir: str, draws: int | None, quiet: bool) -> int:
     return OK
 
 
+@commands.command("tradeoff")
+@click.argument("file", metavar="FILE")
+@click.option("--out", "out_dir", required=True, metavar="DIR", help="Where tradeoff.html and tradeoff.json go.")
+@click.option("--model", help="Whose fitting settings are measured.  [default: the best by perceptual error]")
+@click.option("--loss", default="log", show_default=True, help="What fits minimise.")
+@click.option("--angles", default="edge", show_default=True, type=click.Choice(["edge", "centre"]), help="As for fit.")
+@click.option(
+    "--max-angle",
+    default=80.0,
+    show_default=True,
+    type=click.FloatRange(0, 90, min_open=True, max_open=True),
+    callback=_finite,
+    help="Largest polar angle fitted, degrees.",
+)
+@click.option("--quiet", is_flag=True, help="Print nothing.")
+def tradeoff_command(
+    file: str, out_dir: str, model: str | None, loss: str, angles: Any, max_angle: float, quiet: bool
+) -> int:
+    """Measure what accuracy costs in time, for the material of FILE on this machine; takes a minute and a half."""
+    from .progress import Progress
+    from .tables import load
+
+    table = load(file, angles=angles)
+    _keep_programs()
+    _checked_names(model or DEFAULT_MODELS, loss)
+    out = _writable(out_dir)
+    from .tradeoff import PIECES, survey, write_tradeoff
+
+    with Progress(PIECES, silent=quiet) as progress:
+        result = survey(table, model, loss=loss, max_angle=max_angle, progress=progress)
+    page = write_tradeoff(out, result)
+    if not quiet:
+        click.echo(f"tradeoff: {page}")
+    return OK if all(f.converged for f in result.fits) else SOME_FAILED
+
+
 def _checked_names(models: str, loss: str) -> list[str]:
     """The models of a list with commas, once each. Raises UsageError for an unknown name of a model or loss."""
     from .fitting.losses import LOSSES

@@ -2,9 +2,9 @@
 
     python benchmarks/losses.py TABLES --keep losses.jsonl --out docs/losses.md [--every 2]
 
-TABLES holds MERL .binary files, of which every N-th is taken. Each is fitted with each model under each loss and measure. The
-perceptual error is that of reports, with the solid-angle measure whatever was fitted; the image difference is the mean
-CIEDE2000 of the sphere that reports render. Finished fits are kept as lines of JSON, and an interrupted run goes on from them.
+TABLES holds MERL .binary files, of which every N-th is taken. Each is fitted with each model under each loss and measure.
+The perceptual error is that of reports, with the solid-angle measure whatever was fitted; the image difference is the mean
+CIEDE2000 of the sphere that reports render. Finished fits are kept as lines of JSON; an interrupted run goes on from them.
 """
 
 from __future__ import annotations
@@ -38,10 +38,7 @@ def measured(path: Path) -> Iterator[Row]:
     table = brdfit.load(path)
     directions = sphere_directions()
     fits = [
-        brdfit.fit(table, model, loss=loss, measure=measure)
-        for measure in MEASURES
-        for loss in LOSSES
-        for model in MODELS
+        brdfit.fit(table, model, loss=loss, measure=measure) for measure in MEASURES for loss in LOSSES for model in MODELS
     ]
     for fit in fits:
         values = evaluate(fit.model, *directions[1:], table.channels)
@@ -95,14 +92,16 @@ def page(rows: list[Row], command: str) -> str:
         f"{len(materials)} materials x {len(MODELS)} models x {len(LOSSES)} losses x {len(MEASURES)} measures, made on "
         f"{date.today().isoformat()} by",
         f"`{command}`",
-        f"({os.cpu_count()} cores, {platform.machine()}). {sum(r['converged'] for r in rows)} of {len(rows)} fits converged.",
+        f"({os.cpu_count()} cores, {platform.machine()}).",
+        "",
+        f"{sum(r['converged'] for r in rows)} of {len(rows)} fits converged.",
         "",
         "Two errors say how a fit looks: the `perceptual` error over all cells, with the solid-angle measure whatever was",
         "fitted, and the mean CIEDE2000 between the sphere of the material and that of the fit, as reports render it.",
         "",
         "## What a better choice than the default would gain",
         "",
-        f"The default is {named(DEFAULT)}. *Default over best* is its error over that of the choice that is best on average, "
+        f"The default is {named(DEFAULT)}. *Default over best* is its error over that of the choice that is best on average,",
         "median (quartiles) over the materials; the last column counts the materials on which the default is worse.",
         "",
         "| model | error | best on average | default over best | default worse on |",

@@ -1,0 +1,168 @@
+"""One sentence for each question, made from the numbers."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+
+from ..fitting import Fit
+from ..models.masking.smith import NODES
+from ..reports.words import SEEN, listed, minus, percent, seconds, significant
+from .approximations import Approximation
+from .pareto import front
+from .rendering import Rendering
+from .settings import Setting
+from .smith import Quadrature
+
+STANDARD_ERRORS = 0.1
+"""Error of a parameter, in standard errors, that no one can tell from none."""
+ROUGH = 0.01
+"""Relative error of a parameter that many uses allow."""
+NEARLY = 1.1
+"""Errors up to this multiple of the smallest one count as about as good."""
+UNSEEN = 1e-3
+"""Relative difference of BRDF values that no image of eight bits shows."""
+
+
+def settings_advice(measured: Sequence[Setting], optimum: Fit | None) -> str:
+    """How hard to fit."""
+    if not measured or optimum is None:
+        return "No model could be fitted, so that no setting could be measured."
+    default = next((s for s in measured if s.family == "default"), measured[0])
+    exact = max(measured, key=lambda s: (s.effort.path == "exact", s.effort.cells))
+    said = (
+        f"Fitting {optimum.model_name} with default settings takes {seconds(default.seconds.median)} and ends "
+        f"{significant(default.standard_errors, 2)} standard errors from the optimum of all cells"
+    )
+    if exact is not default:
+        said += f" (a search over every cell: {seconds(exact.seconds.median)})"
+    sure = _fastest(measured, lambda s: s.standard_errors <= STANDARD_ERRORS)
+    if sure is None:
+        said += f"; no setting stays within {STANDARD_ERRORS:g}"
+    elif sure is not default and sure.seconds.high < default.seconds.low:
+        said += (
+            f"; {sure.label} takes {seconds(sure.seconds.median)} and stays within {STANDARD_ERRORS:g} standard errors too"
+        )
+    else:
+        said += f"; nothing that stays within {STANDARD_ERRORS:g} is clearly faster"
+    rough = _fastest(measured, lambda s: s.relative <= ROUGH)
+    if rough is not None and rough is not sure and rough.seconds.high < (sure or default).seconds.low:
+        said += (
+            f"; where {percent(ROUGH)} of a parameter does not matter, {rough.label} takes {seconds(rough.seconds.median)}"
+        )
+    return said + "."
+
+
+def _fastest(measured: Sequence[Setting], allowed: object) -> Setting | None:
+    return min((s for s in measured if allowed(s)), key=lambda s: s.seconds.median, default=None)  # type: ignore[operator]
+
+
+def rendering_advice(drawn: Sequence[Rendering]) -> str:
+    """Which model to render with."""
+    if not drawn:
+        return "No model could be fitted, so that none can be rendered."
+    best = min(drawn, key=lambda r: r.errors["perceptual"])
+    limit = max(SEEN, NEARLY * best.errors["perceptual"])
+    pick = min((r for r in drawn if r.errors["perceptual"] <= limit), key=lambda r: r.seconds.median)
+    near = "hardly anyone sees" if pick.errors["perceptual"] <= SEEN else f"within {NEARLY - 1:.0%} of the smallest"
+    said = (
+        f"Render with {pick.label}: {nanoseconds(pick)} a direction for a perceptual error of "
+        f"{significant(pick.errors['perceptual'])}"
+    )
+    said += f", which {near}" if near.startswith("hardly") else f", {near}" if pick.model != best.model else ", the smallest"
+    kept = [drawn[i] for i in front([(r.seconds.median, r.errors["perceptual"]) for r in drawn])]
+    dearer = [r for r in kept if r.seconds.median > pick.seconds.median]
+    cheaper = [r for r in kept if r.seconds.median < pick.seconds.median]
+    if dearer:
+        gain = 1 - dearer[0].errors["perceptual"] / pick.errors["perceptual"]
+        times = dearer[0].seconds.median / pick.seconds.median
+        said += f"; {dearer[0].label} has {percent(gain)} less error for {significant(times, 2)} times the time"
+    else:
+        said += "; no dearer model is better on this material"
+    if cheaper:
+        worse = cheaper[-1].errors["perceptual"] / pick.errors["perceptual"]
+        times = pick.seconds.median / cheaper[-1].seconds.median
+        faster = f"{cheaper[-1].label} is {significant(times, 2)} times as fast"
+        said += f", and {faster} with {significant(worse, 2)} times the error"
+    return said + "."
+
+
+def nanoseconds(r: Rendering | Approximation | Quadrature) -> str:
+    """Median time of one direction."""
+    return f"{significant(1e9 * r.seconds.median, 2)} ns"
+
+
+def quadrature_advice(rules: Sequence[Quadrature]) -> str:
+    """How many nodes for Smith's integral."""
+    if not rules:
+        return "No model with Smith's integral could be fitted."
+    said = []
+    for name in dict.fromkeys(r.model for r in rules):
+        mine = [r for r in rules if r.model == name]
+        own = next(r for r in mine if r.rule == "even in u" and r.nodes == NODES)
+        table = next(r for r in mine if r.rule == "table")
+        enough = [r for r in mine if r.rule != "table" and r.largest <= UNSEEN] or [own]
+        fewest = min(enough, key=lambda r: (r.nodes, r.largest))
+        said.append(
+            f"{name} keeps its values to {percent(UNSEEN)} with {fewest.nodes} nodes {fewest.rule} ({nanoseconds(fewest)} a "
+            f"direction; the package's {NODES}: {nanoseconds(own)}), and to {significant(table.largest, 1)} with masking from "
+            f"a table made once ({nanoseconds(table)})"
+        )
+    return "; ".join(said) + "."
+
+
+def fresnel_advice(forms: Sequence[Approximation]) -> str:
+    """Whether Schlick's approximation does."""
+    return _exchange_advice(forms, "No model with an exchangeable Fresnel term could be fitted.")
+
+
+def masking_advice(forms: Sequence[Approximation]) -> str:
+    """Whether a simpler masking does."""
+    return _exchange_advice(forms, "No microfacet model could be fitted.")
+
+
+COUNTERPART = {
+    "Schlick": "exact dielectric",
+    "exact dielectric": "Schlick",
+    "V-cavity": "Smith, height-correlated",
+    "Smith, height-correlated": "V-cavity",
+    "Smith, separable": "V-cavity",
+}
+"""The form that a sentence sets against a model's own."""
+
+
+def _exchange_advice(forms: Sequence[Approximation], nothing: str) -> str:
+    if not forms:
+        return nothing
+    said = []
+    for own in (f for f in forms if f.own):
+        other = next(f for f in forms if f.model == own.model and f.form == COUNTERPART[own.form])
+        ratio = other.seconds.median / own.seconds.median
+        cost = (
+            f"takes {significant(ratio, 2)} times the time"
+            if ratio >= 1
+            else f"is {significant(1 / ratio, 2)} times as fast"
+        )
+        if max(own.seconds.low, other.seconds.low) <= min(own.seconds.high, other.seconds.high):
+            cost = "takes the same time"
+        if other.refitted:
+            changes = {k: other.refitted[k] / own.refitted[k] - 1 for k in other.refitted}
+            effect = "fitted again, changes the error by " + listed(f"{_signed(v)} ({k})" for k, v in changes.items())
+        else:
+            effect = "could not be fitted again"
+        said.append(
+            f"in {own.model}, {_form(other.form)} for {_form(own.form)} {cost}, moves 1 value in 100 by more than "
+            f"{percent(other.large)} and, {effect}"
+        )
+    text = "; ".join(said) + "."
+    return text[0].upper() + text[1:]
+
+
+def _form(form: str) -> str:
+    return f"{form.split(',')[0]} masking" if form.startswith(("Smith", "V-")) else form
+
+
+def _signed(share: float) -> str:
+    return minus(f"{100 * share:+.1f} %")
+
+
+__all__ = ["fresnel_advice", "masking_advice", "nanoseconds", "quadrature_advice", "rendering_advice", "settings_advice"]

@@ -1,0 +1,268 @@
+"""The survey as files: one self-contained page, and JSON with all numbers."""
+
+from __future__ import annotations
+
+import json
+from collections.abc import Sequence
+from dataclasses import asdict
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+from ..environment import environment
+from ..files import StrPath, replacing
+from ..reports.words import seconds as duration
+from ..reports.words import significant, thousands
+from .approximations import Approximation
+from .plots import Panel, Point, pareto
+from .rendering import Rendering
+from .settings import Setting
+from .smith import Quadrature
+from .survey import Tradeoff
+from .timing import Timing
+
+PAGE = "tradeoff.html"
+NUMBERS = "tradeoff.json"
+FLOOR_OF_STANDARD_ERRORS = 1e-4
+FLOOR_OF_EXCESS = 1e-12
+FLOOR_OF_DIFFERENCE = 1e-15
+
+
+def write_tradeoff(out_dir: StrPath, result: Tradeoff) -> Path:
+    """Write DIR/tradeoff.json and DIR/tradeoff.html, each replaced whole; returns the path of the page."""
+    from jinja2 import Environment, FileSystemLoader, StrictUndefined
+
+    where = environment()
+    here = Path(__file__).parent
+    templates = Environment(
+        loader=FileSystemLoader([here, here.parent / "reports"]),
+        autoescape=True,
+        undefined=StrictUndefined,
+        trim_blocks=True,
+        lstrip_blocks=True,
+    )
+    html = templates.get_template("tradeoff.html.j2").render(_context(result, where))
+    numbers = json.dumps(document(result, where), indent=1, ensure_ascii=False, allow_nan=False) + "\n"
+    out = Path(out_dir)
+    for name, text in ((NUMBERS, numbers), (PAGE, html)):
+        with replacing(out / name) as temporary:
+            temporary.write_text(text, encoding="utf-8")
+    return out / PAGE
+
+
+def document(result: Tradeoff, where: dict[str, Any]) -> dict[str, Any]:
+    """All numbers as plain JSON values; where and when they were measured is in ``environment``. NaN becomes null."""
+    table = result.table
+    first = result.fits[0]
+    plain: dict[str, Any] = _plain(
+        {
+            "format": "brdfit-tradeoff",
+            "version": 1,
+            "environment": where,
+            "material": table.material,
+            "source": table.source,
+            "sha256": table.sha256,
+            "angles": table.angles,
+            "loss": first.loss,
+            "measure": first.measure,
+            "max_angle": first.max_angle,
+            "advice": result.advice,
+            "optimum": None if result.optimum is None else result.optimum.record(),
+            **{k: [asdict(r) for r in getattr(result, k)] for k in _MEASURED},
+            "fits": [f.record() for f in result.fits],
+        }
+    )
+    return plain
+
+
+_MEASURED = ("settings", "renderings", "quadratures", "fresnel", "masking")
+
+
+def _plain(x: Any) -> Any:
+    if isinstance(x, dict):
+        return {k: _plain(v) for k, v in x.items()}
+    if isinstance(x, list | tuple):
+        return [_plain(v) for v in x]
+    if isinstance(x, float | np.floating):
+        return float(x) if np.isfinite(x) else None
+    return x
+
+
+def _context(result: Tradeoff, where: dict[str, Any]) -> dict[str, Any]:
+    loss = result.fits[0].loss
+    model = result.optimum.model_name if result.optimum else ""
+    return {
+        "material": result.table.material,
+        "source": Path(result.table.source).name,
+        "sha256": result.table.sha256[:12],
+        "cells": thousands(result.fits[0].cells["used"]),
+        "loss": loss,
+        "model": model,
+        "where": where,
+        "advice": result.advice,
+        "problems": [f"{f.model_name}: {f.reason}" for f in result.fits if not f.converged],
+        "settings": {
+            "plot": _settings_plot(result.settings, model),
+            "rows": [_setting(s, loss) for s in result.settings],
+        },
+        "rendering": {"plot": _rendering_plot(result.renderings), "rows": [_rendering(r) for r in result.renderings]},
+        "quadrature": {"plot": _quadrature_plot(result.quadratures), "rows": [_quadrature(q) for q in result.quadratures]},
+        "exchange": [
+            {
+                "key": key,
+                "plot": _exchange_plot(forms, loss, key),
+                "rows": [_exchange(f, loss) for f in forms],
+                "perceptual": loss != "perceptual",
+            }
+            for key, forms in (("fresnel", result.fresnel), ("masking", result.masking))
+        ],
+    }
+
+
+def _spread(t: Timing, scale: float = 1.0) -> str:
+    return f"{duration(t.low * scale)} to {duration(t.high * scale)}"
+
+
+def _nano(t: Timing) -> dict[str, str]:
+    return {
+        "time": significant(1e9 * t.median),
+        "spread": f"{significant(1e9 * t.low)} to {significant(1e9 * t.high)}",
+    }
+
+
+def _setting(s: Setting, loss: str) -> dict[str, str]:
+    return {
+        "label": s.label,
+        "family": s.family,
+        "time": duration(s.seconds.median),
+        "spread": _spread(s.seconds),
+        "repeats": str(s.seconds.repeats),
+        "prepare": duration(s.prepare.median),
+        "path": s.path,
+        "relative": significant(s.relative, 2),
+        "standard": significant(s.standard_errors, 2),
+        "spreads": significant(s.spreads, 2),
+        "excess": significant(s.excess, 2),
+        "error": significant(s.errors[loss], 6),
+        "perceptual": significant(s.errors["perceptual"], 6),
+    }
+
+
+def _rendering(r: Rendering) -> dict[str, Any]:
+    return {
+        "label": r.label,
+        "masking": {"integral": "Smith's integral", "table": "Smith from a table"}.get(r.masking, "closed form"),
+        "numbers": r.numbers,
+        "narrow": _nano(r.seconds),
+        "wide": _nano(r.seconds_float64),
+        "flops": thousands(r.operations.flops),
+        "transcendentals": thousands(r.operations.transcendentals),
+        "bytes": thousands(r.operations.bytes),
+        "perceptual": significant(r.errors["perceptual"]),
+        "log": significant(r.errors["log"]),
+        "deviation": significant(r.deviation, 1),
+    }
+
+
+def _quadrature(q: Quadrature) -> dict[str, Any]:
+    return {
+        "model": q.model,
+        "rule": "from a table" if q.rule == "table" else q.rule,
+        "nodes": q.nodes,
+        "time": _nano(q.seconds),
+        "largest": significant(q.largest, 2),
+        "typical": significant(q.typical, 2),
+        "excess": ", ".join(f"{significant(100 * v, 2)} %" for v in q.excess.values()),
+    }
+
+
+def _exchange(a: Approximation, loss: str) -> dict[str, Any]:
+    def both(errors: dict[str, float]) -> list[str]:
+        return [significant(errors[k], 4) if k in errors else "\u2013" for k in dict.fromkeys((loss, "perceptual"))]
+
+    return {
+        "model": a.model,
+        "form": a.form,
+        "own": a.own,
+        "time": _nano(a.seconds),
+        "typical": f"{significant(100 * a.typical, 2)} %",
+        "large": f"{significant(100 * a.large, 2)} %",
+        "errors": both(a.errors),
+        "refitted": both(a.refitted),
+    }
+
+
+def _settings_plot(measured: Sequence[Setting], model: str) -> str:
+    def points(error: str) -> list[Point]:
+        return [
+            Point(
+                s.label, s.family, s.seconds.median, getattr(s, error), s.seconds.low, s.seconds.high, s.family == "default"
+            )
+            for s in measured
+        ]
+
+    panels = (
+        Panel(
+            points("standard_errors"), "prepare and solve, seconds", "parameter error, std. errors", FLOOR_OF_STANDARD_ERRORS
+        ),
+        Panel(points("excess"), "prepare and solve, seconds", "excess of the cost over the optimum", FLOOR_OF_EXCESS),
+    )
+    return pareto(panels, f"Error over time of each setting of a fit of {model}", "tradeoff-settings")
+
+
+def _rendering_plot(drawn: Sequence[Rendering]) -> str:
+    def points(flops: bool) -> list[Point]:
+        out = []
+        for r in drawn:
+            t = r.seconds
+            cost = r.operations.flops + r.operations.transcendentals if flops else 1e9 * t.median
+            spread = (None, None) if flops else (1e9 * t.low, 1e9 * t.high)
+            out.append(Point(r.label, r.model, cost, r.errors["perceptual"], *spread, named=True))
+        return out
+
+    panels = (
+        Panel(points(False), "float32, nanoseconds a direction", "perceptual error"),
+        Panel(points(True), "operations a direction, by the compiler's count", "perceptual error"),
+    )
+    return pareto(panels, "Perceptual error over the cost of evaluation of each model", "tradeoff-rendering")
+
+
+def _quadrature_plot(rules: Sequence[Quadrature]) -> str:
+    def points(nodes: bool) -> list[Point]:
+        out = []
+        for q in rules:
+            if nodes and q.rule == "table":
+                continue
+            label = "table" if q.rule == "table" else f"{q.nodes} in {q.rule[-1]}"
+            spread = (None, None) if nodes else (1e9 * q.seconds.low, 1e9 * q.seconds.high)
+            out.append(Point(label, q.model, q.nodes if nodes else 1e9 * q.seconds.median, q.largest, *spread))
+        return out
+
+    panels = (
+        Panel(points(True), "nodes", "largest relative error of the BRDF", FLOOR_OF_DIFFERENCE, apart=True),
+        Panel(
+            points(False),
+            "float64, nanoseconds a direction",
+            "largest relative error of the BRDF",
+            FLOOR_OF_DIFFERENCE,
+            apart=True,
+        ),
+    )
+    return pareto(panels, "Quadrature error of Smith masking over nodes and over time", "tradeoff-quadrature")
+
+
+def _exchange_plot(forms: Sequence[Approximation], loss: str, key: str) -> str:
+    def points(error: str) -> list[Point]:
+        return [
+            Point(a.form, a.model, 1e9 * a.seconds.median, a.refitted.get(error, np.nan), 1e9 * a.seconds.low,
+                  1e9 * a.seconds.high, named=True)
+            for a in forms
+        ]  # fmt: skip
+
+    names = tuple(dict.fromkeys((loss, "perceptual")))
+    panels = [Panel(points(n), "float32, nanoseconds a direction", f"{n} error, fitted again", apart=True) for n in names]
+    return pareto(panels, f"Error over cost of each form of {key}", f"tradeoff-{key}")
+
+
+__all__ = ["document", "write_tradeoff"]

@@ -1,0 +1,83 @@
+"""What a more expressive model buys and what it costs to render with."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+
+import numpy as np
+
+from ..fitting import Fit
+from .evaluation import Evaluation, Operations, direct
+from .exchange import MASKINGS, PARTS
+from .sample import Sample
+from .tabulated import from_table, tabulate
+from .timing import Timing, interleaved
+
+REPEATS = 9
+BUDGET = 8.0
+
+
+@dataclass(frozen=True)
+class Rendering:
+    """One way to evaluate a fitted model."""
+
+    label: str
+    model: str
+    masking: str
+    """``"integral"``: Smith's integral for each pair of directions; ``"table"``: read off a table; ``""``: closed form."""
+    numbers: int
+    """Fitted numbers."""
+    seconds: Timing
+    """For one pair of directions and all channels, in float32."""
+    seconds_float64: Timing
+    operations: Operations
+    errors: dict[str, float]
+    """Of the fit, over all its cells, by loss."""
+    deviation: float
+    """Largest relative difference from the model evaluated directly in float64."""
+
+
+def renderings(fits: Sequence[Fit], sample: Sample) -> list[Rendering]:
+    """Every fitted model, and those with Smith's integral once more with masking from a table."""
+    narrow: dict[tuple[str, str], Evaluation] = {}
+    wide: dict[tuple[str, str], Evaluation] = {}
+    of = {f.model_name: f for f in fits if f.model is not None}
+    for name, fit in of.items():
+        integral = _smith(fit)
+        ways = [("integral" if integral else "", direct, fit.model)]
+        if integral and fit.model is not None:
+            ways.append(("table", from_table(sample.max_angle), tabulate(fit.model, sample.max_angle)))
+        for masking, function, what in ways:
+            for dtype, programs in (("float32", narrow), ("float64", wide)):
+                programs[name, masking] = Evaluation(function, what, sample, dtype)
+    programs = {("float32", *k): e for k, e in narrow.items()} | {("float64", *k): e for k, e in wide.items()}
+    seconds = interleaved(programs, REPEATS, BUDGET)
+    out = []
+    for name, masking in narrow:
+        fit = of[name]
+        exact = wide[name, "integral" if masking else ""].values()
+        given = narrow[name, masking].values()
+        out.append(
+            Rendering(
+                label=f"{name}, table" if masking == "table" else name,
+                model=name,
+                masking=masking,
+                numbers=sum(v.size for v in fit.parameters.values()),
+                seconds=seconds["float32", name, masking].per(len(sample.wi)),
+                seconds_float64=seconds["float64", name, masking].per(len(sample.wi)),
+                operations=narrow[name, masking].operations(),
+                errors=dict(fit.errors),
+                deviation=float(np.max(np.abs(given - exact) / np.maximum(np.abs(exact), 1e-30))),
+            )
+        )
+    return out
+
+
+def _smith(fit: Fit) -> bool:
+    """Whether the model's masking is Smith's integral."""
+    parts = PARTS.get(type(fit.model))  # type: ignore[arg-type]
+    return parts is not None and MASKINGS[parts.masking].__name__.startswith("smith")
+
+
+__all__ = ["Rendering", "renderings"]

@@ -1,0 +1,108 @@
+"""All measurements on one material, in order, each followed by its sentence of advice."""
+
+from __future__ import annotations
+
+import time
+from dataclasses import dataclass
+
+from ..fitting import Fit, fit_many
+from ..models import MODELS
+from ..progress import Progress
+from ..tables import Table
+from .advice import fresnel_advice, masking_advice, quadrature_advice, rendering_advice, settings_advice
+from .approximations import Approximation, approximations
+from .rendering import Rendering, renderings
+from .sample import draw
+from .settings import Setting, settings
+from .smith import Quadrature, quadratures
+
+PIECES = len(MODELS) + 5
+"""Steps that :func:`survey` reports to a progress."""
+
+WHOLE = 70.0
+"""Seconds that all measurements may take: the settings of a fit, which come last, get what is left of them."""
+LEAST = 15.0
+"""Seconds that the settings get in any case."""
+
+
+@dataclass(frozen=True)
+class Tradeoff:
+    """What accuracy costs in time, for one material on this machine."""
+
+    table: Table
+    fits: tuple[Fit, ...]
+    """Every model with default settings."""
+    optimum: Fit | None
+    """Of all cells, of the model whose settings were measured; None where no model could be fitted."""
+    settings: list[Setting]
+    renderings: list[Rendering]
+    quadratures: list[Quadrature]
+    fresnel: list[Approximation]
+    masking: list[Approximation]
+    advice: dict[str, str]
+    """One sentence for each question: settings, rendering, quadrature, fresnel, masking."""
+
+
+def survey(
+    table: Table,
+    model: str | None = None,
+    *,
+    loss: str = "log",
+    measure: str = "solid_angle",
+    max_angle: float = 80.0,
+    progress: Progress | None = None,
+) -> Tradeoff:
+    """Measure everything on one table.
+
+    Args:
+        table: What was measured.
+        model: Whose fitting settings are measured; by default that of the smallest ``perceptual`` error.
+        loss: What fits minimise.
+        measure: What a cell counts by, ``"solid_angle"`` or ``"cells"``.
+        max_angle: Largest polar angle of either direction, degrees, in (0, 90).
+        progress: Where to say what was done, :data:`PIECES` times.
+
+    Raises:
+        InputError: No cell lies within ``max_angle``.
+        ValueError: Unknown model, loss or measure.
+    """
+    begin = time.perf_counter()
+    progress = progress or Progress(PIECES, silent=True)
+    sample = draw(table, max_angle, measure)
+    fits: list[Fit] = []
+    progress.say(f"{table.material}: fitting")
+    for f in fit_many([table], list(MODELS), loss=loss, measure=measure, max_angle=max_angle):
+        fits.append(f)
+        took = f"{f.seconds['prepare'] + f.seconds['solve']:.2f} s"
+        progress.advance(f"{f.model_name}: perceptual {f.errors['perceptual']:.5f}, {took}" if f.model else f.reason)
+    fits.sort(key=lambda f: list(MODELS).index(f.model_name))
+    losses = tuple(dict.fromkeys(("perceptual", loss)))
+    advice: dict[str, str] = {}
+
+    def advised(question: str, sentence: str) -> None:
+        advice[question] = sentence
+        progress.advance(f"{question}: {sentence}")
+
+    progress.say("rendering")
+    drawn = renderings(fits, sample)
+    advised("rendering", rendering_advice(drawn))
+    progress.say("Smith's integral")
+    rules = quadratures(fits, sample, losses)
+    advised("quadrature", quadrature_advice(rules))
+    progress.say("Fresnel")
+    fresnel = approximations("fresnel", fits, table, sample, losses)
+    advised("fresnel", fresnel_advice(fresnel))
+    progress.say("masking")
+    masking = approximations("masking", fits, table, sample, losses)
+    advised("masking", masking_advice(masking))
+    progress.say("settings of a fit")
+    usable = [f for f in fits if f.model is not None and f.model_name == (model or f.model_name)]
+    optimum, measured = None, list[Setting]()
+    if usable:
+        best = min(usable, key=lambda f: f.errors["perceptual"])
+        optimum, measured = settings(table, best, max(LEAST, WHOLE - (time.perf_counter() - begin)))
+    advised("settings", settings_advice(measured, optimum))
+    return Tradeoff(table, tuple(fits), optimum, measured, drawn, rules, fresnel, masking, advice)
+
+
+__all__ = ["PIECES", "Tradeoff", "survey"]
