@@ -169,8 +169,8 @@ def page(table: brdfit.Table, results: list[dict[str, Any]]) -> str:
         lines.append(f"| {r['model']} | {r['residuals']:,} | {r['coordinates']} | " + " | ".join(cells) + " |")
     lines += [
         "",
-        "Where the time goes, beside one bare evaluation of the fitted model in all channels on the fitted cells as separate",
-        "directions. A gram pass is residuals, Jacobian and normal equations over every cell.",
+        "Where the time goes, beside one bare evaluation of the fitted model in all channels on the fitted cells as",
+        "separate directions. A gram pass is residuals, Jacobian and normal equations over every cell.",
         "",
         "| model | bare evaluation | data pass | solve | gram pass | SciPy/compressed | compressed/bare | gram pass/bare |",
         "|---|---|---|---|---|---|---|---|",
