@@ -83,6 +83,8 @@ class Geometry(eqx.Module):
     @property
     def theta_i(self) -> Field:
         """Polar angle of the light, radians."""
+        # Guard, here and below: the cosine of a vector normalised to rounding may be above 1, the square of a sine of an
+        # azimuth below 0 (tests/test_geometry.py::test_angles_that_come_from_cosines).
         return jnp.arccos(jnp.clip(self.cos_i, -1, 1))
 
     @property
@@ -155,6 +157,7 @@ def from_sums(total: Array, difference: Array, cos_i: Array, cos_o: Array) -> Ge
     # The derivative of z/|l + v| cancels where x^2 + y^2 is small, that of (x^2 + y^2)/|l + v|^2 where z is, and between two
     # directions that graze |l + v| may be 1e-4 (tests/test_stability.py::test_single_precision).
     high = x2 + y2 < z2
+    # Guard: 0/0 in the derivative where l + v lies on the horizon (tests/test_geometry.py::test_half_vector_on_the_horizon).
     tan2 = (x2 + y2) / jnp.where(high, z2, 1)
     return Geometry(
         cos_i=cos_i,

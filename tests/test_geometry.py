@@ -172,6 +172,16 @@ def test_normal_incidence_and_retro_are_exact():
     assert half_difference(slanted, slanted * [-1, -1, 1])[0] == 0
 
 
+def test_half_vector_on_the_horizon():
+    """l + v without a component along the normal: theta_h is 90 degrees, with finite derivatives."""
+    with jax.enable_x64(True):
+        l, v = jnp.array([1.0, 0.0, 0.0]), jnp.array([0.0, 1.0, 0.0])  # noqa: E741
+        for field, value in (("cos_h", 0), ("sin2_h", 1)):
+            f = lambda l, v: getattr(from_directions(l, v), field)  # noqa: B023, E731, E741
+            assert f(l, v) == value
+            assert all(np.isfinite(s).all() for s in jax.grad(f, (0, 1))(l, v))
+
+
 def test_angles_that_come_from_cosines():
     """theta_i, theta_o and phi_d are taken from cosines: half of the digits near 0 and pi, no NaN anywhere."""
     with jax.enable_x64(True):

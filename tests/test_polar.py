@@ -31,6 +31,12 @@ def test_smith_through_the_table(lobe: type, parameters: tuple[float, float]):
     np.testing.assert_allclose(cosine / (cosine + through_table(f, cosine)), cosine / (cosine + exact), rtol=3e-9)
 
 
+def test_beyond_one():
+    """n.v of a vector normalised to rounding may be 1 + 2e-16: it is 1."""
+    f = lambda c: 1 + jnp.arccos(c)  # noqa: E731
+    assert through_table(f, np.array([1 + 2.3e-16])) == pytest.approx(1, abs=1e-12)
+
+
 def test_stencil_is_cubic():
     """Exact for cubics, up to both ends of the table: 1024 intervals of values of size 1 round to 1e-12."""
     theta = np.linspace(0, LIMIT, 777)

@@ -49,13 +49,15 @@ def test_single_precision(part: Part):
     found = measure.errors(part, points, got, want, np.float32)
     least = measure.errors(part, points, (want[0] + by_value, want[1] + by_slope), want, np.float32)
     for error, moved in zip(found, least, strict=True):
-        error = np.where(np.isnan(error), 0, error)
         assert np.isfinite(got[0]).all()
         assert np.isfinite(got[1]).all()
-        held = moved <= measure.HELD
-        assert held.mean() > 0.7  # the rest is narrow lobes far from their peak, and indices of refraction of 1
+        exists = ~np.isnan(error) & ~np.isnan(moved)
+        held, beyond = exists & (moved <= measure.HELD), exists & (moved > measure.HELD)
+        assert (
+            held.sum() > 0.6 * exists.sum()
+        )  # the rest is narrow lobes far from their peak, and indices of refraction of 1
         assert error[held].max() <= 1e-5
-        assert (error[~held] <= np.maximum(1e-5, 5 * moved[~held])).all()
+        assert (error[beyond] <= np.maximum(1e-5, 5 * moved[beyond])).all()
 
 
 def test_every_part_has_a_reference():

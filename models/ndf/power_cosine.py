@@ -11,10 +11,10 @@ from ...special import log1p_ratio
 def log_cosine_ratio(sin2: Float[Array, "..."], cos2: Float[Array, "..."]) -> Float[Array, "..."]:
     """ln(cos)/sin^2: ln(1 - sin^2)/(2 sin^2) near the pole, where it is -1/2, and ln(cos^2)/(2 sin^2) near the horizon."""
     high = sin2 < 0.5
-    # Guard: ln(1 - sin^2) is -inf where sin^2 rounds to 1, and ln(cos^2)/sin^2 is 0/0 at the pole, with NaN derivatives
+    # Guards: ln(1 - sin^2) is -inf where sin^2 rounds to 1, and ln(cos^2)/sin^2 is 0/0 at the pole, with NaN derivatives
     # in the branch that is not used (tests/test_ndf.py::test_power_cosine_at_both_ends).
     near_pole = log1p_ratio(-jnp.where(high, sin2, 0))
-    near_horizon = jnp.log(jnp.where(high, 1, cos2)) / jnp.where(high, 1, sin2)
+    near_horizon = jnp.log(cos2) / jnp.where(high, 1, sin2)
     return jnp.where(high, -near_pole, near_horizon) / 2
 
 

@@ -41,6 +41,7 @@ class SGD(eqx.Module):
         x, weight = (jnp.asarray(a, jnp.result_type(self.alpha)) for a in gauss_legendre(128))
         s, m = 1 - self.p, self.reference()
         # Where the range is cut is no part of the answer: no derivative goes through it.
+        # Guards: 45/rate has no meaning, and the wrong sign, for a rate below 0 (tests/test_ndf.py::test_normalisation).
         rate, scale = jax.lax.stop_gradient((s, m))
         end = jnp.minimum(jnp.log(_tail(scale, 45) / scale), 45 / jnp.maximum(-rate, 0.1))
         start = jnp.maximum(jnp.log(self.alpha / m), -1 - 45 / jnp.maximum(rate, 0.1))
