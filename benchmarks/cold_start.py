@@ -86,10 +86,10 @@ def setting(file: str, repeats: int) -> None:
                         jax.block_until_ready(compiled(arrays))
                         runs.append(time.perf_counter() - start)
                     taken[label].append((middle - begin, statistics.median(runs)))
-            words = [
-                f"{label}: compile {statistics.median(c for c, _ in t):.2f} s, run {1e3 * statistics.median(r for _, r in t):.1f} ms"
-                for label, t in taken.items()
-            ]
+            words = []
+            for label, pairs in taken.items():
+                to_compile, to_run = (statistics.median(p[k] for p in pairs) for k in (0, 1))
+                words.append(f"{label}: compile {to_compile:.2f} s, run {1e3 * to_run:.1f} ms")
             print(f"{name:18s} " + "; ".join(words))
 
 
