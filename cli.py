@@ -104,7 +104,7 @@ def fit_command(
 
     files = tuple(dict.fromkeys(files))
     for path in files:  # nothing is fitted or written if one of them cannot be used
-        load(path, angles=angles)
+        kept = {path: load(path, angles=angles)}
     _keep_programs()
     names = _checked_names(models, loss)
     out = _writable(out_dir)
@@ -120,7 +120,7 @@ def fit_command(
     with Progress(len(files) * len(names), silent=quiet or as_json) as progress:
         try:
             for path in files:
-                table = load(path, angles=angles)
+                table = kept.pop(path) if path in kept else load(path, angles=angles)
                 progress.say(f"{table.material}: fitting")
                 first, views = len(fits), None
                 for f in fit_many([table], names, loss=loss, measure=measure, max_angle=max_angle, seed=seed):
@@ -252,10 +252,10 @@ def tradeoff_command(
     _keep_programs()
     _checked_names(model or DEFAULT_MODELS, loss)
     out = _writable(out_dir)
-    from .tradeoff import PIECES, survey, write_tradeoff
+    from .tradeoff import PIECES, tradeoff, write_tradeoff
 
     with Progress(PIECES, silent=quiet) as progress:
-        result = survey(table, model, loss=loss, max_angle=max_angle, progress=progress)
+        result = tradeoff(table, model, loss=loss, max_angle=max_angle, progress=progress)
     page = write_tradeoff(out, result)
     if not quiet:
         click.echo(f"tradeoff: {page}")

@@ -101,7 +101,7 @@ def page(rows: list[Row], command: str) -> str:
         "",
         "## What a better choice than the default would gain",
         "",
-        f"The default is {named(DEFAULT)}. *Default over best* is its error over that of the choice that is best on average,",
+        f"The default is {named(DEFAULT)}. *Default over best*: its error over that of the choice that is best on average,",
         "median (quartiles) over the materials; the last column counts the materials on which the default is worse.",
         "",
         "| model | error | best on average | default over best | default worse on |",

@@ -8,6 +8,7 @@ from ..fitting import Fit
 from ..models.masking.smith import NODES
 from ..reports.words import SEEN, listed, minus, percent, seconds, significant
 from .approximations import Approximation
+from .exchange import COUNTERPART
 from .pareto import front
 from .rendering import Rendering
 from .settings import Setting
@@ -71,7 +72,7 @@ def rendering_advice(drawn: Sequence[Rendering]) -> str:
     said += f", which {near}" if near.startswith("hardly") else f", {near}" if pick.model != best.model else ", the smallest"
     kept = [drawn[i] for i in front([(r.seconds.median, r.errors["perceptual"]) for r in drawn])]
     dearer = [r for r in kept if r.seconds.median > pick.seconds.median]
-    cheaper = [r for r in kept if r.seconds.median < pick.seconds.median]
+    cheaper = [r for r in kept if r.seconds.high < pick.seconds.low]
     if dearer:
         gain = 1 - dearer[0].errors["perceptual"] / pick.errors["perceptual"]
         times = dearer[0].seconds.median / pick.seconds.median
@@ -104,8 +105,8 @@ def quadrature_advice(rules: Sequence[Quadrature]) -> str:
         fewest = min(enough, key=lambda r: (r.nodes, r.largest))
         said.append(
             f"{name} keeps its values to {percent(UNSEEN)} with {fewest.nodes} nodes {fewest.rule} ({nanoseconds(fewest)} a "
-            f"direction; the package's {NODES}: {nanoseconds(own)}), and to {significant(table.largest, 1)} with masking from "
-            f"a table made once ({nanoseconds(table)})"
+            f"direction; the package's {NODES}: {nanoseconds(own)}), and to {significant(table.largest, 1)} with masking "
+            f"from a table made once ({nanoseconds(table)})"
         )
     return "; ".join(said) + "."
 
@@ -118,16 +119,6 @@ def fresnel_advice(forms: Sequence[Approximation]) -> str:
 def masking_advice(forms: Sequence[Approximation]) -> str:
     """Whether a simpler masking does."""
     return _exchange_advice(forms, "No microfacet model could be fitted.")
-
-
-COUNTERPART = {
-    "Schlick": "exact dielectric",
-    "exact dielectric": "Schlick",
-    "V-cavity": "Smith, height-correlated",
-    "Smith, height-correlated": "V-cavity",
-    "Smith, separable": "V-cavity",
-}
-"""The form that a sentence sets against a model's own."""
 
 
 def _exchange_advice(forms: Sequence[Approximation], nothing: str) -> str:
@@ -144,14 +135,17 @@ def _exchange_advice(forms: Sequence[Approximation], nothing: str) -> str:
         )
         if max(own.seconds.low, other.seconds.low) <= min(own.seconds.high, other.seconds.high):
             cost = "takes the same time"
-        if other.refitted:
-            changes = {k: other.refitted[k] / own.refitted[k] - 1 for k in other.refitted}
-            effect = "fitted again, changes the error by " + listed(f"{_signed(v)} ({k})" for k, v in changes.items())
-        else:
-            effect = "could not be fitted again"
+        if not other.refitted:
+            said.append(f"in {own.model} keep {_form(own.form)}: with {_form(other.form)} it could not be fitted again")
+            continue
+        changes = {k: other.refitted[k] / own.refitted[k] - 1 for k in other.refitted}
+        better = changes["perceptual"] < 1 / NEARLY - 1 or (changes["perceptual"] <= NEARLY - 1 and cost.endswith("as fast"))
+        kept, left = (other, own) if better else (own, other)
+        effect = listed(f"{_signed(v)} ({k})" for k, v in changes.items())
+        verdict = f"{'take' if better else 'keep'} {_form(kept.form)}, not {_form(left.form)}"
         said.append(
-            f"in {own.model}, {_form(other.form)} for {_form(own.form)} {cost}, moves 1 value in 100 by more than "
-            f"{percent(other.large)} and, {effect}"
+            f"in {own.model} {verdict}: {_form(other.form)} {cost}, "
+            f"moves 1 value in 100 by more than {percent(other.large)} and, fitted again, changes the error by {effect}"
         )
     text = "; ".join(said) + "."
     return text[0].upper() + text[1:]

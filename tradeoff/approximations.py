@@ -14,7 +14,7 @@ from ..fitting import Effort, Fit, fit
 from ..models import BRDF, parameter_values
 from ..tables import Table
 from .evaluation import Evaluation, direct
-from .exchange import FRESNELS, MASKINGS, PARTS, exchanged
+from .exchange import COUNTERPART, FRESNELS, MASKINGS, PARTS, exchanged
 from .sample import Sample
 from .timing import Timing, interleaved
 
@@ -91,8 +91,8 @@ def _forms(part: str, model: BRDF | None) -> dict[str, BRDF]:
     values = parameter_values(model)
     if part == "fresnel":
         return {form: exchanged(cls, fresnel=term)(**values) for form, term in FRESNELS[cls].items()}
-    names = sorted(MASKINGS, key=lambda form: form != PARTS[cls].masking)
-    return {form: exchanged(cls, masking=MASKINGS[form])(**values) for form in names}
+    own = PARTS[cls].masking
+    return {form: exchanged(cls, masking=MASKINGS[form])(**values) for form in (own, COUNTERPART[own], "none")}
 
 
 def _refitted(table: Table, start: BRDF, like: Fit) -> dict[str, float]:

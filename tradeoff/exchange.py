@@ -76,6 +76,16 @@ FRESNELS: dict[type[BRDF], dict[str, Fresnel]] = {
 """The Fresnel terms of a model, its own first: both reflect the same at normal incidence."""
 
 
+COUNTERPART = {
+    "Schlick": "exact dielectric",
+    "exact dielectric": "Schlick",
+    "V-cavity": "Smith, height-correlated",
+    "Smith, height-correlated": "V-cavity",
+    "Smith, separable": "V-cavity",
+}
+"""The form that is set against a model's own."""
+
+
 @cache
 def exchanged(cls: type[BRDF], fresnel: Fresnel | None = None, masking: Masking | None = None) -> type[BRDF]:
     """The model class ``cls``, a key of :data:`PARTS`, with the parts given in place of its own."""
@@ -92,4 +102,4 @@ def exchanged(cls: type[BRDF], fresnel: Fresnel | None = None, masking: Masking 
     return Exchanged
 
 
-__all__ = ["FRESNELS", "MASKINGS", "PARTS", "Fresnel", "Masking", "exchanged"]
+__all__ = ["COUNTERPART", "FRESNELS", "MASKINGS", "PARTS", "Fresnel", "Masking", "exchanged"]

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import json
 from collections.abc import Sequence
-from dataclasses import asdict
+from dataclasses import asdict, replace
 from pathlib import Path
 from typing import Any
 
@@ -27,6 +27,8 @@ NUMBERS = "tradeoff.json"
 FLOOR_OF_STANDARD_ERRORS = 1e-4
 FLOOR_OF_EXCESS = 1e-12
 FLOOR_OF_DIFFERENCE = 1e-15
+SHORT = {"Smith, height-correlated": "correlated", "Smith, separable": "separable", "exact dielectric": "exact"}
+"""Forms as plots name them."""
 
 
 def write_tradeoff(out_dir: StrPath, result: Tradeoff) -> Path:
@@ -120,8 +122,8 @@ def _context(result: Tradeoff, where: dict[str, Any]) -> dict[str, Any]:
     }
 
 
-def _spread(t: Timing, scale: float = 1.0) -> str:
-    return f"{duration(t.low * scale)} to {duration(t.high * scale)}"
+def _spread(t: Timing) -> str:
+    return f"{duration(t.low)} to {duration(t.high)}"
 
 
 def _nano(t: Timing) -> dict[str, str]:
@@ -131,14 +133,12 @@ def _nano(t: Timing) -> dict[str, str]:
     }
 
 
-def _setting(s: Setting, loss: str) -> dict[str, str]:
+def _setting(s: Setting, loss: str) -> dict[str, Any]:
     return {
         "label": s.label,
-        "family": s.family,
         "time": duration(s.seconds.median),
         "spread": _spread(s.seconds),
-        "repeats": str(s.seconds.repeats),
-        "prepare": duration(s.prepare.median),
+        "repeats": s.seconds.repeats,
         "path": s.path,
         "relative": significant(s.relative, 2),
         "standard": significant(s.standard_errors, 2),
@@ -152,13 +152,12 @@ def _setting(s: Setting, loss: str) -> dict[str, str]:
 def _rendering(r: Rendering) -> dict[str, Any]:
     return {
         "label": r.label,
-        "masking": {"integral": "Smith's integral", "table": "Smith from a table"}.get(r.masking, "closed form"),
+        "masking": {"integral": "integral", "table": "table"}.get(r.masking, "closed"),
         "numbers": r.numbers,
         "narrow": _nano(r.seconds),
-        "wide": _nano(r.seconds_float64),
+        "wide": significant(1e9 * r.seconds_float64.median),
         "flops": thousands(r.operations.flops),
         "transcendentals": thousands(r.operations.transcendentals),
-        "bytes": thousands(r.operations.bytes),
         "perceptual": significant(r.errors["perceptual"]),
         "log": significant(r.errors["log"]),
         "deviation": significant(r.deviation, 1),
@@ -211,14 +210,20 @@ def _settings_plot(measured: Sequence[Setting], model: str) -> str:
     return pareto(panels, f"Error over time of each setting of a fit of {model}", "tradeoff-settings")
 
 
+def _timed(label: str, group: str, t: Timing, error: float) -> Point:
+    """A point whose cost is the time of one direction in nanoseconds."""
+    return Point(label, group, 1e9 * t.median, error, 1e9 * t.low, 1e9 * t.high, named=True)
+
+
 def _rendering_plot(drawn: Sequence[Rendering]) -> str:
     def points(flops: bool) -> list[Point]:
         out = []
         for r in drawn:
-            t = r.seconds
-            cost = r.operations.flops + r.operations.transcendentals if flops else 1e9 * t.median
-            spread = (None, None) if flops else (1e9 * t.low, 1e9 * t.high)
-            out.append(Point(r.label, r.model, cost, r.errors["perceptual"], *spread, named=True))
+            error = r.errors["perceptual"]
+            if flops:
+                out.append(Point(r.label, r.model, r.operations.flops + r.operations.transcendentals, error, named=True))
+            else:
+                out.append(_timed(r.label, r.model, r.seconds, error))
         return out
 
     panels = (
@@ -232,11 +237,11 @@ def _quadrature_plot(rules: Sequence[Quadrature]) -> str:
     def points(nodes: bool) -> list[Point]:
         out = []
         for q in rules:
-            if nodes and q.rule == "table":
-                continue
             label = "table" if q.rule == "table" else f"{q.nodes} in {q.rule[-1]}"
-            spread = (None, None) if nodes else (1e9 * q.seconds.low, 1e9 * q.seconds.high)
-            out.append(Point(label, q.model, q.nodes if nodes else 1e9 * q.seconds.median, q.largest, *spread))
+            if not nodes:
+                out.append(replace(_timed(label, q.model, q.seconds, q.largest), named=False))
+            elif q.rule != "table":
+                out.append(Point(label, q.model, q.nodes, q.largest))
         return out
 
     panels = (
@@ -254,11 +259,7 @@ def _quadrature_plot(rules: Sequence[Quadrature]) -> str:
 
 def _exchange_plot(forms: Sequence[Approximation], loss: str, key: str) -> str:
     def points(error: str) -> list[Point]:
-        return [
-            Point(a.form, a.model, 1e9 * a.seconds.median, a.refitted.get(error, np.nan), 1e9 * a.seconds.low,
-                  1e9 * a.seconds.high, named=True)
-            for a in forms
-        ]  # fmt: skip
+        return [_timed(SHORT.get(a.form, a.form), a.model, a.seconds, a.refitted.get(error, float("nan"))) for a in forms]
 
     names = tuple(dict.fromkeys((loss, "perceptual")))
     panels = [Panel(points(n), "float32, nanoseconds a direction", f"{n} error, fitted again", apart=True) for n in names]

@@ -73,7 +73,7 @@ def _draw(ax: Any, panel: Panel, look: dict[str, dict[str, Any]]) -> None:
     ax.set_yscale("log")
     costs, errors = np.array([p.cost for p in shown]), np.maximum([p.error for p in shown], floor)
     span = np.log10(costs.max() / costs.min()), np.log10(errors.max() / errors.min())
-    ax.set_xlim(costs.min() / 10 ** (0.12 + 0.30 * span[0]), costs.max() * 10 ** (0.08 + 0.12 * span[0]))
+    ax.set_xlim(costs.min() / 10 ** (0.12 + 0.30 * span[0]), costs.max() * 10 ** (0.15 + 0.16 * span[0]))
     ax.set_ylim(errors.min() / 10 ** (0.10 + 0.22 * span[1]), errors.max() * 10 ** (0.05 + 0.08 * span[1]))
     seen: set[str] = set()
     for competing in list(dict.fromkeys(p.group for p in shown)) if panel.apart else [None]:

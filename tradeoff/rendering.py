@@ -2,10 +2,12 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass
+from typing import Any
 
 import numpy as np
+from jaxtyping import Array
 
 from ..fitting import Fit
 from .evaluation import Evaluation, Operations, direct
@@ -13,6 +15,9 @@ from .exchange import MASKINGS, PARTS
 from .sample import Sample
 from .tabulated import from_table, tabulate
 from .timing import Timing, interleaved
+
+Way = tuple[str, Callable[[Any, Array, Array], Array], Any]
+"""The masking, a function of what, wi and wo, and what."""
 
 REPEATS = 9
 BUDGET = 8.0
@@ -45,14 +50,16 @@ def renderings(fits: Sequence[Fit], sample: Sample) -> list[Rendering]:
     of = {f.model_name: f for f in fits if f.model is not None}
     for name, fit in of.items():
         integral = _smith(fit)
-        ways = [("integral" if integral else "", direct, fit.model)]
+        ways: list[tuple[str, Callable[[Any, Array, Array], Array], Any]] = [
+            ("integral" if integral else "", direct, fit.model)
+        ]
         if integral and fit.model is not None:
             ways.append(("table", from_table(sample.max_angle), tabulate(fit.model, sample.max_angle)))
         for masking, function, what in ways:
             for dtype, programs in (("float32", narrow), ("float64", wide)):
                 programs[name, masking] = Evaluation(function, what, sample, dtype)
-    programs = {("float32", *k): e for k, e in narrow.items()} | {("float64", *k): e for k, e in wide.items()}
-    seconds = interleaved(programs, REPEATS, BUDGET)
+    both = {("float32", *k): e for k, e in narrow.items()} | {("float64", *k): e for k, e in wide.items()}
+    seconds = interleaved(both, REPEATS, BUDGET)
     out = []
     for name, masking in narrow:
         fit = of[name]

@@ -5,6 +5,7 @@ from __future__ import annotations
 from dataclasses import dataclass
 
 import jax
+import jax.numpy as jnp
 import numpy as np
 from numpy.typing import NDArray
 
@@ -39,7 +40,7 @@ class Sample:
         """
         with jax.enable_x64(True):
             g = from_directions(self.wi, self.wo)
-            residual = np.asarray(LOSSES[loss].bind(self.measured)(values, self.measured, g))
+            residual = np.asarray(LOSSES[loss].bind(self.measured)(jnp.asarray(values), jnp.asarray(self.measured), g))
             relative = LOSSES[loss].weight(g)
         weight = np.ones(len(residual)) if relative is None else np.asarray(relative)
         return float(np.sqrt((weight[:, None] * residual**2).sum() / (weight.sum() * residual.shape[1])))

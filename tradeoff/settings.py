@@ -13,9 +13,9 @@ from ..fitting import Effort, Fit, fit
 from ..tables import Table
 from .timing import Timing
 
-ROUNDS = 7
+ROUNDS = 8
 LEAST = 2
-"""Rounds that are made whatever they take."""
+"""Rounds that are made whatever they take. If there are more, the first, in which programs are loaded, does not count."""
 
 Key = tuple[bool, int]
 
@@ -75,31 +75,31 @@ class Setting:
 def settings(table: Table, best: Fit, budget: float, choices: Sequence[Choice] = CHOICES) -> tuple[Fit, list[Setting]]:
     """The optimum of all cells for one fitted model, and what every choice makes of it.
 
-    The choices take turns, round after round, until ``budget`` seconds are over; a first round is not counted. The optimum
-    is where an exact search over every cell to the last digit ends that starts from the best fit that any choice found.
+    The choices take turns, round after round, until ``budget`` seconds are over. The optimum is where an exact search over
+    every cell to the last digit ends that starts from the best fit that any choice found.
     """
     begin = time.perf_counter()
     order = sorted(choices, key=lambda c: c.preparation)
     prepare: dict[Key, list[float]] = {c.preparation: [] for c in order}
     solve: dict[str, list[float]] = {c.label: [] for c in order}
     fits: dict[str, Fit] = {}
-    for k in range(1 + ROUNDS):
-        if k > LEAST and time.perf_counter() - begin > budget:
+    for k in range(ROUNDS):
+        if k >= LEAST and time.perf_counter() - begin > budget:
             break
         for key, members in groupby(order, key=lambda c: c.preparation):
             fresh = replace(table)  # what is prepared for a table is kept with it
             for n, c in enumerate(members):
                 f = _fit(fresh, best, c.effort)
                 fits[c.label] = f
-                if k:
-                    solve[c.label].append(f.seconds["solve"])
-                    if n == 0:
-                        prepare[key].append(f.seconds["prepare"])
+                solve[c.label].append(f.seconds["solve"])
+                if n == 0:
+                    prepare[key].append(f.seconds["prepare"])
     least = min((best, *fits.values()), key=lambda f: f.errors[best.loss])
-    optimum = _fit(table, replace(best, model=least.model), Effort(path="exact", starts=1, rtol=1e-13))
+    optimum = _fit(table, replace(best, model=least.model), Effort(path="exact", starts=3, rtol=1e-13))
+    first = int(len(solve[choices[0].label]) > LEAST)
     out = []
     for c in choices:
-        both = [a + b for a, b in zip(prepare[c.preparation], solve[c.label], strict=True)]
+        prepared, solved = prepare[c.preparation][first:], solve[c.label][first:]
         f = fits[c.label]
         relative, standard, spread = _distance(f, optimum)
         excess = (f.errors[f.loss] / optimum.errors[f.loss]) ** 2 - 1 if optimum.errors[f.loss] > 0 else float("nan")
@@ -108,9 +108,9 @@ def settings(table: Table, best: Fit, budget: float, choices: Sequence[Choice] =
                 family=c.family,
                 label=c.label,
                 effort=c.effort,
-                prepare=Timing.of(prepare[c.preparation]),
-                solve=Timing.of(solve[c.label]),
-                seconds=Timing.of(both),
+                prepare=Timing.of(prepared),
+                solve=Timing.of(solved),
+                seconds=Timing.of([a + b for a, b in zip(prepared, solved, strict=True)]),
                 path=f.path,
                 relative=relative,
                 standard_errors=standard,

@@ -17,7 +17,7 @@ from .settings import Setting, settings
 from .smith import Quadrature, quadratures
 
 PIECES = len(MODELS) + 5
-"""Steps that :func:`survey` reports to a progress."""
+"""Steps that :func:`tradeoff` reports to a progress."""
 
 WHOLE = 70.0
 """Seconds that all measurements may take: the settings of a fit, which come last, get what is left of them."""
@@ -43,7 +43,7 @@ class Tradeoff:
     """One sentence for each question: settings, rendering, quadrature, fresnel, masking."""
 
 
-def survey(
+def tradeoff(
     table: Table,
     model: str | None = None,
     *,
@@ -105,4 +105,4 @@ def survey(
     return Tradeoff(table, tuple(fits), optimum, measured, drawn, rules, fresnel, masking, advice)
 
 
-__all__ = ["PIECES", "Tradeoff", "survey"]
+__all__ = ["PIECES", "Tradeoff", "tradeoff"]

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from dataclasses import replace
 from typing import NamedTuple
 
@@ -42,7 +43,7 @@ def tabulate(model: BRDF, max_angle: float) -> Tabulated:
         return Tabulated(model, made if _own_lobes(model) else [t[0] for t in made])
 
 
-def from_table(max_angle: float) -> object:
+def from_table(max_angle: float) -> Callable[[Tabulated, Array, Array], Array]:
     """A function of (:class:`Tabulated`, wi, wo) that gives BRDF values ``[n, C]`` within ``max_angle`` degrees."""
     limit = float(np.radians(max_angle))
 
