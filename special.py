@@ -36,21 +36,24 @@ def expm1_ratio(x: ArrayLike) -> Scalars:
     return jnp.where(small, series, jnp.expm1(far) / far)
 
 
+def log1p_series(x: Scalars) -> Scalars:
+    """ln(1 + x)/x for |x| <= 0.1 as 2 artanh(z)/x, z = x/(2 + x): terms fall by 361 each, the first left out is 1e-19."""
+    z2 = (x / (2 + x)) ** 2
+    series = jnp.full_like(z2, 1 / 13)
+    for k in range(5, -1, -1):
+        series = series * z2 + 1.0 / (2 * k + 1)
+    return 2 / (2 + x) * series
+
+
 def log1p_ratio(x: ArrayLike) -> Scalars:
     """ln(1 + x)/x for x > -1, equal to 1 at x = 0.
 
-    Relative error below 4 ulp. Below |x| < 0.1 the series 2 artanh(x/(2+x))/x is used: its terms fall by 400 each.
+    Relative error below 4 ulp. The series serves |x| < 0.1.
     """
     x = jnp.asarray(x)
     small = jnp.abs(x) < 0.1
-    near = jnp.where(small, x, 0.0)
-    z2 = (near / (2 + near)) ** 2
-    series = jnp.zeros_like(near)
-    for k in range(8, -1, -1):
-        series = series * z2 + 1.0 / (2 * k + 1)
-    series = 2 / (2 + near) * series
     far = jnp.where(small, 1.0, x)  # guard: 0/0 (test_special.py::test_log1p_ratio_derivatives)
-    return jnp.where(small, series, jnp.log1p(far) / far)
+    return jnp.where(small, log1p_series(x), jnp.log1p(far) / far)
 
 
 SLOPE_LIMIT = 1e37

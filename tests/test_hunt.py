@@ -1,8 +1,8 @@
 """A search for the worst case of each model, and the cases that it found.
 
 Hypothesis is steered towards larger errors (``target``); what is found is kept in ``FOUND`` as examples. It is held to the
-domain of ``stability/domain.py``: a component of a direction is 0 or at least ``SMALLEST``, as an angle is known to no better
-than 1e-8 rad, and so is an albedo. Without it the search ends at denormal numbers, whose squares are 0.
+domain of ``stability/domain.py``: a component of a direction is 0 or at least ``SMALLEST``, as an angle is known to no
+better than 1e-8 rad, and so is an albedo. Without it the search ends at denormal numbers, whose squares are 0.
 """
 
 from __future__ import annotations

@@ -103,6 +103,17 @@ def test_power_cosine_at_both_ends():
             assert np.isfinite(jax.hessian(f)(v)).all()
 
 
+def test_power_cosine_anisotropic_at_the_pole():
+    """Value (ex + 1)/(2 pi) for equal exponents, and -sqrt((ex+1)(ey+1))/(2 pi) ex/2 as the slope by x^2."""
+    with jax.enable_x64(True):
+        f = lambda x2: ndf.power_cosine_anisotropic(x2, jnp.asarray(0.0), 1 - x2, jnp.asarray(3.0), jnp.asarray(8.0))  # noqa: E731
+        for x2 in (0.0, 1e-30):
+            assert f(x2) == pytest.approx(6 / (2 * np.pi), rel=1e-15)
+            assert jax.grad(f)(x2) == pytest.approx(-6 / (2 * np.pi) * 1.5, rel=1e-15)
+            # ln(cos)/sin^2 = -1/2 - sin^2/4: half of the square of the slope's factor, less ex/2
+            assert jax.grad(jax.grad(f))(x2) == pytest.approx(6 / (2 * np.pi) * (1.5**2 - 3 / 2), rel=1e-14)
+
+
 @pytest.mark.parametrize("name", cases.ANISOTROPIC_NDFS)
 def test_equal_widths(name: str):
     """The anisotropic form equals the isotropic one, to the rounding of exponents of up to 700."""
