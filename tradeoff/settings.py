@@ -6,6 +6,7 @@ import time
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass, replace
 from itertools import groupby
+from typing import Any
 
 import numpy as np
 
@@ -14,8 +15,6 @@ from ..tables import Table
 from .timing import Timing
 
 ROUNDS = 8
-LEAST = 2
-"""Rounds that are made whatever they take. If there are more, the first, in which programs are loaded, does not count."""
 
 Key = tuple[bool, int]
 
@@ -36,9 +35,9 @@ class Choice:
 
 CHOICES: tuple[Choice, ...] = (
     Choice("default", "default", Effort()),
-    *(Choice("starts", f"{n} start{'s' * (n > 1)}", Effort(starts=n)) for n in (1, 3)),
-    *(Choice("tolerance", f"tolerance {t:.0e}".replace("e-0", "e-"), Effort(rtol=t)) for t in (1e-3, 1e-6)),
-    *(Choice("nodes", f"{n} nodes", Effort(path="compressed", nodes=n)) for n in (3, 4, 6, 14)),
+    Choice("starts", "1 start", Effort(starts=1)),
+    Choice("tolerance", "tolerance 1e-3", Effort(rtol=1e-3)),
+    *(Choice("nodes", f"{n} nodes", Effort(path="compressed", nodes=n)) for n in (3, 6, 14)),
     Choice("several", "6 nodes, 1 start, 1e-4", Effort(path="compressed", nodes=6, starts=1, rtol=1e-4)),
     *(Choice("cells", f"{s:.0%} of the cells", Effort(path="exact", cells=s)) for s in (0.01, 0.1)),
     Choice("cells", "every cell", Effort(path="exact")),
@@ -57,7 +56,7 @@ class Setting:
     solve: Timing
     """Seconds of the search, the pass over all cells that judges it, and the error bars."""
     seconds: Timing
-    """Both."""
+    """Both: the median of preparing and the solve."""
     path: str
     """Which residuals the optimum is one of, ``exact`` or ``compressed``."""
     relative: float
@@ -75,31 +74,31 @@ class Setting:
 def settings(table: Table, best: Fit, budget: float, choices: Sequence[Choice] = CHOICES) -> tuple[Fit, list[Setting]]:
     """The optimum of all cells for one fitted model, and what every choice makes of it.
 
-    The choices take turns, round after round, until ``budget`` seconds are over. The optimum is where an exact search over
-    every cell to the last digit ends that starts from the best fit that any choice found.
+    The choices take turns, round after round: each is measured once, and again while what it takes is left of ``budget``
+    seconds. The optimum is where an exact search over every cell to the last digit ends that starts from the best fit that
+    any choice found.
     """
     begin = time.perf_counter()
     order = sorted(choices, key=lambda c: c.preparation)
     prepare: dict[Key, list[float]] = {c.preparation: [] for c in order}
     solve: dict[str, list[float]] = {c.label: [] for c in order}
     fits: dict[str, Fit] = {}
-    for k in range(ROUNDS):
-        if k >= LEAST and time.perf_counter() - begin > budget:
-            break
+    for _ in range(ROUNDS):
         for key, members in groupby(order, key=lambda c: c.preparation):
             fresh = replace(table)  # what is prepared for a table is kept with it
-            for n, c in enumerate(members):
-                f = _fit(fresh, best, c.effort)
-                fits[c.label] = f
+            ready = False
+            for c in members:
+                if solve[c.label] and time.perf_counter() - begin + solve[c.label][-1] > budget:
+                    continue
+                fits[c.label] = f = _fit(fresh, type(best.model), best, c.effort)
                 solve[c.label].append(f.seconds["solve"])
-                if n == 0:
+                if not ready:
                     prepare[key].append(f.seconds["prepare"])
-    least = min((best, *fits.values()), key=lambda f: f.errors[best.loss])
-    optimum = _fit(table, replace(best, model=least.model), Effort(path="exact", starts=3, rtol=1e-13))
-    first = int(len(solve[choices[0].label]) > LEAST)
+                ready = True
+    optimum = _optimum(table, min((best, *fits.values()), key=lambda f: f.errors[best.loss]))
     out = []
     for c in choices:
-        prepared, solved = prepare[c.preparation][first:], solve[c.label][first:]
+        prepared, solved = Timing.of(_settled(prepare[c.preparation])), Timing.of(_settled(solve[c.label]))
         f = fits[c.label]
         relative, standard, spread = _distance(f, optimum)
         excess = (f.errors[f.loss] / optimum.errors[f.loss]) ** 2 - 1 if optimum.errors[f.loss] > 0 else float("nan")
@@ -108,9 +107,9 @@ def settings(table: Table, best: Fit, budget: float, choices: Sequence[Choice] =
                 family=c.family,
                 label=c.label,
                 effort=c.effort,
-                prepare=Timing.of(prepared),
-                solve=Timing.of(solved),
-                seconds=Timing.of([a + b for a, b in zip(prepared, solved, strict=True)]),
+                prepare=prepared,
+                solve=solved,
+                seconds=solved.after(prepared.median),
                 path=f.path,
                 relative=relative,
                 standard_errors=standard,
@@ -122,10 +121,20 @@ def settings(table: Table, best: Fit, budget: float, choices: Sequence[Choice] =
     return optimum, out
 
 
-def _fit(table: Table, like: Fit, effort: Effort) -> Fit:
-    """The same fit with other settings. An instance of the model is a start; the optimum is polished from there."""
-    model = like.model if effort.rtol < 1e-12 else type(like.model)
-    return fit(table, model, loss=like.loss, measure=like.measure, max_angle=like.max_angle, effort=effort)  # type: ignore[arg-type]
+def _settled(seconds: list[float]) -> list[float]:
+    """Without the first measurement, in which programs are loaded, where enough others are left."""
+    return seconds[1:] if len(seconds) > 2 else seconds
+
+
+def _optimum(table: Table, least: Fit) -> Fit:
+    """Where an exact search from there ends; the fit itself if that is not better."""
+    end = _fit(table, least.model, least, Effort(path="exact", starts=1, rtol=1e-13))
+    return end if end.errors[end.loss] <= least.errors[least.loss] * (1 + 1e-9) else least
+
+
+def _fit(table: Table, model: Any, like: Fit, effort: Effort) -> Fit:
+    """A model fitted as another fit was, but for the effort."""
+    return fit(table, model, loss=like.loss, measure=like.measure, max_angle=like.max_angle, effort=effort)
 
 
 def _distance(f: Fit, optimum: Fit) -> tuple[float, float, float]:

@@ -36,6 +36,10 @@ class Timing:
         """The time of one of ``count`` equal parts."""
         return Timing(self.median / count, self.low / count, self.high / count, self.repeats)
 
+    def after(self, seconds: float) -> Timing:
+        """The time together with what comes before it."""
+        return Timing(self.median + seconds, self.low + seconds, self.high + seconds, self.repeats)
+
 
 def interleaved(calls: Mapping[Key, Callable[[], object]], repeats: int, budget: float) -> dict[Key, Timing]:
     """Time every call ``repeats`` times, one after the other in rounds, so that a busy moment hits all of them alike.
