@@ -24,15 +24,15 @@ def expm1_ratio(x: ArrayLike) -> Scalars:
     """(e^x - 1)/x, equal to 1 at x = 0.
 
     Domain: every real x below the overflow of e^x. Relative error below 4 ulp. The series serves |x| < 1 so that the
-    first and second derivative do not cancel either (test_special.py::test_expm1_ratio_derivatives).
+    first and second derivative do not cancel either (tests/test_special.py::test_expm1_ratio_derivatives).
     """
     x = jnp.asarray(x)
     small = jnp.abs(x) < 1
-    near = jnp.where(small, x, 0.0)  # guard: overflow of the series (test_special.py::test_expm1_ratio_far_out)
+    near = jnp.where(small, x, 0.0)  # guard: overflow of the series (tests/test_special.py::test_expm1_ratio_far_out)
     series = jnp.full_like(near, _PHI1[-1])
     for coefficient in reversed(_PHI1[:-1]):
         series = series * near + coefficient
-    far = jnp.where(small, 1.0, x)  # guard: 0/0, in the derivative too (test_special.py::test_expm1_ratio_derivatives)
+    far = jnp.where(small, 1.0, x)  # guard: 0/0, and in the derivative (tests/test_special.py::test_expm1_ratio_derivatives)
     return jnp.where(small, series, jnp.expm1(far) / far)
 
 
@@ -52,7 +52,7 @@ def log1p_ratio(x: ArrayLike) -> Scalars:
     """
     x = jnp.asarray(x)
     small = jnp.abs(x) < 0.1
-    far = jnp.where(small, 1.0, x)  # guard: 0/0 (test_special.py::test_log1p_ratio_derivatives)
+    far = jnp.where(small, 1.0, x)  # guard: 0/0 (tests/test_special.py::test_log1p_ratio_derivatives)
     return jnp.where(small, log1p_series(x), jnp.log1p(far) / far)
 
 

@@ -55,6 +55,8 @@ def test_expm1_ratio_far_out():
     np.testing.assert_allclose(value, [1e-18, 1e-9, float(mp.expm1(700) / 700)], rtol=1e-12)
     assert np.isfinite(first).all()
     assert np.isfinite(second).all()
+    # (1 - gamma) M of gamma 1e7 and alpha 1e-9, whose 19th power is beyond float32
+    assert jax.grad(expm1_ratio)(jnp.float32(-4e8)) == pytest.approx(4e8**-2, rel=1e-6)
 
 
 def test_log1p_ratio_derivatives():
