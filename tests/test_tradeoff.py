@@ -203,7 +203,9 @@ def measured():
         settings.Choice("nodes", "3 nodes", Effort(path="compressed", nodes=3)),
         settings.Choice("cells", "every cell", Effort(path="exact")),
     )
-    optimum, found = settings.settings(table, best, 0.0, choices)
+    with pytest.MonkeyPatch.context() as patch:
+        patch.setattr(settings, "ROUNDS", 1)
+        optimum, found = settings.settings(table, best, 1e9, choices)
     return best, optimum, {s.label: s for s in found}
 
 
@@ -218,7 +220,7 @@ def test_settings_are_measured_against_the_optimum_of_all_cells(measured):
     assert found["3 nodes"].standard_errors > 3 * found["every cell"].standard_errors
     for s in found.values():
         assert s.excess > -1e-9
-        assert s.seconds.repeats == 1, "without a budget each is measured once"
+        assert s.seconds.repeats == 1, "in one round"
         assert s.seconds.median == pytest.approx(s.solve.median + s.prepare.median)
         assert s.errors["log"] >= optimum.errors["log"] * (1 - 1e-9)
     assert found["default"].prepare == found["loose"].prepare, "settings of one preparation share it"
@@ -243,10 +245,16 @@ def test_settings_are_repeated_while_there_is_time(monkeypatch, small_table):
         settings.Choice("cells", "every cell", Effort(path="exact", nodes=99)),
     )
     best = fit_of("ward", WARD, 0.1)
+    monkeypatch.setattr(settings, "LEAST", 5.0)
     _, found = settings.settings(small_table[0], best, 18.0, choices)
     assert log[:7] == [3, 10, 99, 3, 10, 3, 10], "in turns, and what takes too long is not repeated"
     assert [s.seconds.repeats for s in found] == [3, 3, 1]
     assert [s.seconds.median for s in found] == [1.5, 1.5, 10.5]
+    monkeypatch.setattr(settings, "LEAST", 11.0)
+    _, found = settings.settings(small_table[0], best, 11.5, choices)
+    assert [s.seconds.repeats for s in found] == [5, 6, 1], "11 seconds after the first round, whatever that took"
+    _, found = settings.settings(small_table[0], best, 0.5, choices)
+    assert [s.label for s in found] == ["default", "3 nodes"], "no time for the last one"
 
 
 def test_errors_of_parameters():
@@ -302,6 +310,7 @@ def drawn(label, seconds, error):
             "no dearer model is better on this material, and a is 10 times as fast",
         ),
         ([drawn("a", 10, 0.021), drawn("b", 100, 0.02)], "Render with a: 10 ns a direction"),  # as good within a tenth
+        ([drawn("a", 10, 0.009), drawn("b", 11, 0.005)], "Render with b"),  # nearly as fast, and so much better
         ([drawn("a", 10, 0.009), drawn("b", 100, 0.002)], "which hardly anyone sees; b has 77.8 % less error for 10 times"),
         ([], "none can be rendered"),
     ],
@@ -348,8 +357,8 @@ def test_every_form_has_a_counterpart():
 def quick(monkeypatch):
     """Few directions, models and settings."""
     monkeypatch.setattr(survey, "MODELS", {k: models.MODELS[k] for k in ("gtr", "ward")})
-    monkeypatch.setattr(survey, "LEAST", 0.0)
-    monkeypatch.setattr(survey, "WHOLE", 0.0)
+    monkeypatch.setattr(settings, "ROUNDS", 2)
+    monkeypatch.setattr(survey, "WHOLE", 1e9)
     monkeypatch.setattr(sample, "COUNT", 64)
     monkeypatch.setattr(smith, "FEW", 32)
     monkeypatch.setattr(smith, "COUNTS", (8, NODES))

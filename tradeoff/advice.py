@@ -39,18 +39,23 @@ def settings_advice(measured: Sequence[Setting], optimum: Fit | None) -> str:
     sure = _fastest(measured, lambda s: s.standard_errors <= STANDARD_ERRORS)
     if sure is None:
         said += f"; no setting stays within {STANDARD_ERRORS:g}"
-    elif sure is not default and sure.seconds.high < default.seconds.low:
+    elif _clearly_faster(sure, default):
         said += (
             f"; {sure.label} takes {seconds(sure.seconds.median)} and stays within {STANDARD_ERRORS:g} standard errors too"
         )
     else:
         said += f"; nothing that stays within {STANDARD_ERRORS:g} is clearly faster"
     rough = _fastest(measured, lambda s: s.relative <= ROUGH)
-    if rough is not None and rough is not sure and rough.seconds.high < (sure or default).seconds.low:
+    if rough is not None and _clearly_faster(rough, sure or default):
         said += (
             f"; where {percent(ROUGH)} of a parameter does not matter, {rough.label} takes {seconds(rough.seconds.median)}"
         )
     return said + "."
+
+
+def _clearly_faster(a: Setting, b: Setting) -> bool:
+    """By more than the spread and a tenth."""
+    return a.seconds.high < b.seconds.low and NEARLY * a.seconds.median < b.seconds.median
 
 
 def _fastest(measured: Sequence[Setting], allowed: object) -> Setting | None:
@@ -63,7 +68,8 @@ def rendering_advice(drawn: Sequence[Rendering]) -> str:
         return "No model could be fitted, so that none can be rendered."
     best = min(drawn, key=lambda r: r.errors["perceptual"])
     limit = max(SEEN, NEARLY * best.errors["perceptual"])
-    pick = min((r for r in drawn if r.errors["perceptual"] <= limit), key=lambda r: r.seconds.median)
+    good = [r for r in drawn if r.errors["perceptual"] <= limit]
+    pick = min(good, key=lambda r: r.seconds.median * r.errors["perceptual"])
     near = "hardly anyone sees" if pick.errors["perceptual"] <= SEEN else f"within {NEARLY - 1:.0%} of the smallest"
     said = (
         f"Render with {pick.label}: {nanoseconds(pick)} a direction for a perceptual error of "

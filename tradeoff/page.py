@@ -12,8 +12,8 @@ import numpy as np
 
 from ..environment import environment
 from ..files import StrPath, replacing
+from ..reports.words import NONE, significant, thousands
 from ..reports.words import seconds as duration
-from ..reports.words import significant, thousands
 from .approximations import Approximation
 from .plots import Panel, Point, pareto
 from .rendering import Rendering
@@ -123,7 +123,7 @@ def _context(result: Tradeoff, where: dict[str, Any]) -> dict[str, Any]:
 
 
 def _spread(t: Timing) -> str:
-    return f"{duration(t.low)} to {duration(t.high)}"
+    return f"{duration(t.low)} to {duration(t.high)}" if t.repeats > 1 else NONE
 
 
 def _nano(t: Timing) -> dict[str, str]:

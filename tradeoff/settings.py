@@ -15,6 +15,8 @@ from ..tables import Table
 from .timing import Timing
 
 ROUNDS = 8
+LEAST = 12.0
+"""Seconds that there are for repeats in any case."""
 
 Key = tuple[bool, int]
 
@@ -74,21 +76,25 @@ class Setting:
 def settings(table: Table, best: Fit, budget: float, choices: Sequence[Choice] = CHOICES) -> tuple[Fit, list[Setting]]:
     """The optimum of all cells for one fitted model, and what every choice makes of it.
 
-    The choices take turns, round after round: each is measured once, and again while what it takes is left of ``budget``
-    seconds. The optimum is where an exact search over every cell to the last digit ends that starts from the best fit that
-    any choice found.
+    The choices take turns, round after round. One begins while what it took last time is left of ``budget`` seconds, or of
+    :data:`LEAST` after the first round; a choice for which there is no time at all is left out, the default never. The
+    optimum is where an exact search over every cell to the last digit ends that starts from the best fit found.
     """
-    begin = time.perf_counter()
+    end = time.perf_counter() + budget
     order = sorted(choices, key=lambda c: c.preparation)
     prepare: dict[Key, list[float]] = {c.preparation: [] for c in order}
     solve: dict[str, list[float]] = {c.label: [] for c in order}
     fits: dict[str, Fit] = {}
-    for _ in range(ROUNDS):
+    for k in range(ROUNDS):
+        if k == 1:
+            end = max(end, time.perf_counter() + LEAST)
         for key, members in groupby(order, key=lambda c: c.preparation):
             fresh = replace(table)  # what is prepared for a table is kept with it
             ready = False
             for c in members:
-                if solve[c.label] and time.perf_counter() - begin + solve[c.label][-1] > budget:
+                last = solve[c.label][-1] if solve[c.label] else 0.0
+                late = time.perf_counter() + last > end or (k > 0 and not last)
+                if late and (last or c.family != "default"):
                     continue
                 fits[c.label] = f = _fit(fresh, type(best.model), best, c.effort)
                 solve[c.label].append(f.seconds["solve"])
@@ -97,7 +103,7 @@ def settings(table: Table, best: Fit, budget: float, choices: Sequence[Choice] =
                 ready = True
     optimum = _optimum(table, min((best, *fits.values()), key=lambda f: f.errors[best.loss]))
     out = []
-    for c in choices:
+    for c in (c for c in choices if c.label in fits):
         prepared, solved = Timing.of(_settled(prepare[c.preparation])), Timing.of(_settled(solve[c.label]))
         f = fits[c.label]
         relative, standard, spread = _distance(f, optimum)
