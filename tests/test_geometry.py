@@ -5,6 +5,7 @@ value of every float it is given. What remains is the rounding of our own operat
 """
 
 import jax
+import jax.numpy as jnp
 import mpmath as mp
 import numpy as np
 import pytest
@@ -187,6 +188,8 @@ def test_angles_that_come_from_cosines():
     with jax.enable_x64(True):
         g = from_directions(*pairs())
         theta_i, theta_o, phi_d = np.asarray(g.theta_i), np.asarray(g.theta_o), np.asarray(g.phi_d)
+        rounded = from_directions(*np.array([[0, 0, 1 + 2.3e-16]] * 2))  # normalised to rounding
+        assert rounded.theta_i == rounded.theta_o == 0
     assert np.isfinite([theta_i, theta_o, phi_d]).all()
     wi, wo = pairs()
     half = np.sqrt(2.2e-16)

@@ -11,7 +11,7 @@ import numpy as np
 import pytest
 from brdfit import models
 from brdfit.cli import run
-from brdfit.special import SLOPE_LIMIT
+from brdfit.special import SLOPE_LIMIT, hold_slopes
 from brdfit.stability import atlas, measure, page, reference
 from brdfit.stability.parts import PARTS, Part
 
@@ -90,6 +90,11 @@ def test_slopes_are_held():
         m = models.model("gtr", **parameters)
         assert "custom_jvp" not in str(jax.make_jaxpr(m)(wi.astype(float), mirror.astype(float)))
     assert np.finfo(np.float32).max > SLOPE_LIMIT
+    steep = lambda x, y: 1e30 * (1e10 * x) * y  # noqa: E731
+    for sign in (1, -1):  # the slope by x is 1e40, and no inf * 0 comes of a tangent of 0
+        point = jnp.float32(1e-10), jnp.float32(sign)
+        assert jax.grad(lambda x, y: hold_slopes(steep, x, y), (0, 1))(*point) == (sign * SLOPE_LIMIT, 1e30)
+        assert jax.jvp(lambda x, y: hold_slopes(steep, x, y), point, (jnp.float32(0), jnp.float32(1)))[1] == 1e30
 
 
 def test_atlas(tmp_path, monkeypatch, capsys):
