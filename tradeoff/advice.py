@@ -29,12 +29,12 @@ def settings_advice(measured: Sequence[Setting], optimum: Fit | None) -> str:
     if not measured or optimum is None:
         return "No model could be fitted, so that no setting could be measured."
     default = next((s for s in measured if s.family == "default"), measured[0])
-    exact = max(measured, key=lambda s: (s.effort.path == "exact", s.effort.cells))
+    exact = next((s for s in measured if s.effort.path == "exact" and s.effort.cells == 1), None)
     said = (
         f"Fitting {optimum.model_name} with default settings takes {seconds(default.seconds.median)} and ends "
         f"{significant(default.standard_errors, 2)} standard errors from the optimum of all cells"
     )
-    if exact is not default:
+    if exact is not None:
         said += f" (a search over every cell: {seconds(exact.seconds.median)})"
     sure = _fastest(measured, lambda s: s.standard_errors <= STANDARD_ERRORS)
     if sure is None:
@@ -124,7 +124,8 @@ def fresnel_advice(forms: Sequence[Approximation]) -> str:
 
 def masking_advice(forms: Sequence[Approximation]) -> str:
     """Whether a simpler masking does."""
-    return _exchange_advice(forms, "No microfacet model could be fitted.")
+    said = _exchange_advice(forms, "No microfacet model could be fitted.")
+    return f"{said[:-1]} (Smith's by its integral, which a table made once replaces)." if forms else said
 
 
 def _exchange_advice(forms: Sequence[Approximation], nothing: str) -> str:

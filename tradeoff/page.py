@@ -17,7 +17,7 @@ from ..reports.words import seconds as duration
 from .approximations import Approximation
 from .plots import Panel, Point, pareto
 from .rendering import Rendering
-from .settings import Setting
+from .settings import CHOICES, Setting
 from .smith import Quadrature
 from .survey import Tradeoff
 from .timing import Timing
@@ -107,6 +107,7 @@ def _context(result: Tradeoff, where: dict[str, Any]) -> dict[str, Any]:
         "settings": {
             "plot": _settings_plot(result.settings, model),
             "rows": [_setting(s, loss) for s in result.settings],
+            "left_out": [c.label for c in CHOICES if c.label not in {s.label for s in result.settings}],
         },
         "rendering": {"plot": _rendering_plot(result.renderings), "rows": [_rendering(r) for r in result.renderings]},
         "quadrature": {"plot": _quadrature_plot(result.quadratures), "rows": [_quadrature(q) for q in result.quadratures]},

@@ -81,7 +81,7 @@ def settings(table: Table, best: Fit, budget: float, choices: Sequence[Choice] =
     optimum is where an exact search over every cell to the last digit ends that starts from the best fit found.
     """
     end = time.perf_counter() + budget
-    order = sorted(choices, key=lambda c: c.preparation)
+    order = sorted(choices, key=lambda c: (c.preparation != choices[0].preparation, c.preparation))
     prepare: dict[Key, list[float]] = {c.preparation: [] for c in order}
     solve: dict[str, list[float]] = {c.label: [] for c in order}
     fits: dict[str, Fit] = {}

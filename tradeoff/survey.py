@@ -21,6 +21,8 @@ PIECES = len(MODELS) + 5
 
 WHOLE = 70.0
 """Seconds that all measurements may take: the settings of a fit, which come last, get what is left of them."""
+LEAST = 30.0
+"""Seconds that the settings get in any case."""
 
 
 @dataclass(frozen=True)
@@ -98,7 +100,7 @@ def tradeoff(
     optimum, measured = None, list[Setting]()
     if usable:
         best = min(usable, key=lambda f: f.errors["perceptual"])
-        optimum, measured = settings(table, best, WHOLE - (time.perf_counter() - begin))
+        optimum, measured = settings(table, best, max(LEAST, WHOLE - (time.perf_counter() - begin)))
     advised("settings", settings_advice(measured, optimum))
     return Tradeoff(table, tuple(fits), optimum, measured, drawn, rules, fresnel, masking, advice)
 
