@@ -14,7 +14,8 @@ from numpy.typing import NDArray
 from .parts import Part
 
 Reals = NDArray[np.float64]
-BATCH = 2048
+BATCH = 512
+"""Points that one program takes; every number of points is padded to it, since to compile costs more than to evaluate."""
 
 SMALLEST_SINGLE = (1e-22, 1e-16)
 """As ``Part.smallest``, in float32, where exp(-87) = 1e-38 is the smallest number, and heights of lobes and their slopes
@@ -36,8 +37,7 @@ def _compiled(part: Part) -> Callable[[Any], Any]:
 
 def evaluate(part: Part, points: Reals, dtype: Any = np.float64) -> tuple[Reals, Reals]:
     """Values ``[n]`` and slopes ``[n, arguments]`` in the given precision, as float64, at ``points [n, arguments]``."""
-    count = len(points)
-    size = min(BATCH, 1 << max(count - 1, 1).bit_length())
+    count, size = len(points), BATCH
     values, slopes = np.empty(count), np.empty(points.shape)
     with jax.enable_x64(dtype is np.float64):
         f = _compiled(part)
@@ -94,7 +94,7 @@ def moved(part: Part, points: Reals) -> tuple[Reals, Reals]:
     """
     rng = np.random.default_rng(0)
     half_ulp = 2.0**-24
-    count, size = len(points), min(BATCH, 1 << max(len(points) - 1, 1).bit_length())
+    count, size = len(points), BATCH
     by_value, by_slope = np.zeros(count), np.zeros(points.shape)
     with jax.enable_x64(True):
         for k in range(0, count, size):
@@ -115,7 +115,7 @@ def moved(part: Part, points: Reals) -> tuple[Reals, Reals]:
 def not_finite(part: Part, draws: int, dtype: Any, seed: int = 0) -> tuple[int, int]:
     """How many of ``draws`` random points give a value, and how many a slope, that is not finite."""
     values = slopes = 0
-    size = 16 * BATCH
+    size = 64 * BATCH
     for k, first in enumerate(range(0, draws, size)):
         v, s = evaluate(part, part.drawn(min(size, draws - first), seed + k), dtype)
         values += int((~np.isfinite(v)).sum())

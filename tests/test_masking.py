@@ -24,13 +24,15 @@ COSINES = np.sin(np.pi / 2 - np.radians([5.0, 30.0, 60.0, 80.0, 89.0, 89.995]))
     ],
 )
 def test_against_the_projected_area(name: str, parameters: tuple[float, float]):
-    """G1 = n.v / integral of max(0, v.m) D(m), in 40 digits; 1e-8 is promised, 3e-9 leaves room for other parameters."""
+    """G1 = n.v / integral of max(0, v.m) D(m), in 40 digits; 1e-8 is promised. The rule errs by 1e-10 and the
+    oracle leaves out 4e-11 at either end.
+    """
     density, area = {"GTR": (ndf.GTR, oracle.gtr_masking), "SGD": (ndf.SGD, oracle.sgd_masking)}[name]
     with jax.enable_x64(True):
         got = 1 / (1 + masking.smith_lambda(density(*map(jnp.asarray, parameters)), jnp.asarray(COSINES)))
     with oracle.mp.workdps(oracle.DIGITS):
         want = [float(area(*map(mpf, parameters), mpf(float(c)))) for c in COSINES]
-    np.testing.assert_allclose(got, want, rtol=3e-9)
+    np.testing.assert_allclose(got, want, rtol=2e-10)
 
 
 @pytest.mark.parametrize("alpha", [1e-4, 0.1, 1.0, 5.0])

@@ -34,5 +34,5 @@ class GTR(eqx.Module):
         # Guard: a reciprocal, because the derivative of a quotient a/b forms a db, 1e43 here, beyond float32
         # (tests/test_stability.py::test_random_draws_are_finite).
         k = expm1_ratio(m) * (1 / (jnp.pi * expm1_ratio((1 - self.gamma) * m)))
-        half = jnp.exp(-self.gamma / 2 * jnp.log1p(w * u))  # k may be 1e25 where the lobe's fall is below float32
+        half = jnp.exp(-self.gamma / 2 * jnp.log1p(w * u))  # k may be 1e25 where exp is below float32
         return k * half * half
