@@ -118,14 +118,14 @@ def _picture(records: Sequence[Record]) -> bytes:
         figure = Figure(figsize=(8.2, 0.35 + 1.15 * len(pairs)), layout="constrained")
         FigureCanvasAgg(figure)
         axes = figure.subplots(max(len(pairs), 1), 4, squeeze=False)  # the V-cavity alone has no map
-        for line, (record, m) in zip(axes, pairs, strict=False):
+        for row, (line, (record, m)) in enumerate(zip(axes, pairs, strict=False)):
             other = single[record.name, m.varied]
             panels = ((m.value, "float64"), (m.slope, "float64"), (other.value, "float32"), (other.slope, "float32"))
             for k, (ax, (error, precision)) in enumerate(zip(line, panels, strict=True)):
                 digits = np.clip(-np.log10(np.maximum(error, 1e-18)), 0, DIGITS[precision])
                 shown = ax.imshow(digits, cmap="viridis", vmin=0, vmax=DIGITS[precision], aspect="auto")
                 _label(ax, record, m, first=k == 0)
-                if line is axes[0]:
+                if row == 0:
                     ax.set_title(f"{('value', 'slope')[k % 2]}, {precision}: digits")
                 if k % 2:
                     figure.colorbar(shown, ax=ax, pad=0.02, aspect=12)
@@ -146,7 +146,8 @@ def _label(ax: Any, record: Record, m: Map, first: bool) -> None:
     rows = range(0, len(m.rows), max(1, len(m.rows) // 3))
     ax.set_yticks(list(rows), [f"{m.rows[k]:.2g}" for k in rows] if first else [])
     if first:
-        ax.set_ylabel(f"{record.name}\n{m.varied}", fontsize=6)
+        name = record.name.replace("Anisotropic", "\nAnisotropic").replace("_anisotropic", "\nanisotropic")
+        ax.set_ylabel(f"{name}\n{m.varied}", fontsize=6)
 
 
 def _write(path: Path, content: bytes) -> None:
