@@ -18,7 +18,7 @@ def fresh():
 
 
 def test_settings_are_understood_here(fresh):
-    """With the JAX that this is developed with; if this fails, a fit compiles 2.5 times as long as it could."""
+    """With the JAX that this is developed with; if this fails, a fit compiles longer than it need."""
     assert programs._understood() == programs.OPTIONS
 
 
