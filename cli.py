@@ -45,6 +45,23 @@ def _finite(context: click.Context, option: click.Parameter, value: float) -> fl
     return value
 
 
+_angles = click.option(
+    "--angles",
+    default="edge",
+    show_default=True,
+    type=click.Choice(["edge", "centre"]),
+    help="Where in a cell of a MERL file its value holds.",
+)
+_max_angle = click.option(
+    "--max-angle",
+    default=80.0,
+    show_default=True,
+    type=click.FloatRange(0, 90, min_open=True, max_open=True),
+    callback=_finite,
+    help="Largest polar angle fitted, degrees.",
+)
+
+
 @click.group(no_args_is_help=False, context_settings={"help_option_names": ["-h", "--help"], "max_content_width": 100})
 @click.version_option(package_name="brdfit")
 def commands() -> None:
@@ -66,21 +83,8 @@ def commands() -> None:
     type=click.Choice(["solid_angle", "cells"]),
     help="What a cell counts by.",
 )
-@click.option(
-    "--angles",
-    default="edge",
-    show_default=True,
-    type=click.Choice(["edge", "centre"]),
-    help="Where in a cell of a MERL file its value holds.",
-)
-@click.option(
-    "--max-angle",
-    default=80.0,
-    show_default=True,
-    type=click.FloatRange(0, 90, min_open=True, max_open=True),
-    callback=_finite,
-    help="Largest polar angle fitted, degrees.",
-)
+@_angles
+@_max_angle
 @click.option("--seed", default=0, show_default=True, type=click.IntRange(0), help="Seed of random starts.")
 @click.option("--json", "as_json", is_flag=True, help="Print fits.json on standard output, and no progress.")
 @click.option("--report/--no-report", default=True, show_default=True, help="Write report.html.")
@@ -231,15 +235,8 @@ def stability_command(out_dir: str, draws: int | None, quiet: bool) -> int:
 @click.option("--out", "out_dir", required=True, metavar="DIR", help="Where tradeoff.html and tradeoff.json go.")
 @click.option("--model", help="Whose fitting settings are measured.  [default: the best by perceptual error]")
 @click.option("--loss", default="log", show_default=True, help="What fits minimise.")
-@click.option("--angles", default="edge", show_default=True, type=click.Choice(["edge", "centre"]), help="As for fit.")
-@click.option(
-    "--max-angle",
-    default=80.0,
-    show_default=True,
-    type=click.FloatRange(0, 90, min_open=True, max_open=True),
-    callback=_finite,
-    help="Largest polar angle fitted, degrees.",
-)
+@_angles
+@_max_angle
 @click.option("--quiet", is_flag=True, help="Print nothing.")
 def tradeoff_command(
     file: str, out_dir: str, model: str | None, loss: str, angles: Any, max_angle: float, quiet: bool

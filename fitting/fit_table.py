@@ -54,6 +54,8 @@ class Prepared:
     summary: Summary
     loss: Loss
     """The loss, bound to the table."""
+    losses: tuple[Loss, ...]
+    """Every loss that errors are reported under, bound to the table."""
 
 
 _prepared: WeakKeyDictionary[Table, dict[Any, Prepared]] = WeakKeyDictionary()
@@ -74,10 +76,11 @@ def prepare(
         kept = _prepared.setdefault(table, {})
         if key not in kept:
             cells, used = samples(table, max_angle, measure, effort.nodes)
-            bound = loss.bind(table.planes[:, used])
+            values = table.planes[:, used]
+            bound = loss.bind(values)
             kept.clear()
             both = compress(cells, table, used, max_angle, bound) if compressed else cells
-            kept[key] = Prepared(both, used, summarise(table, used), bound)
+            kept[key] = Prepared(both, used, summarise(table, used), bound, _named_losses(values, bound))
         return kept[key]
 
 
@@ -166,7 +169,7 @@ def fit(
         if given:
             proposals.insert(0, {**proposals[0], **_per_channel(cls, given, table.channels)})
         proposals = [{**p, **_per_channel(cls, held, table.channels)} for p in proposals]
-        named = _named_losses(table.planes[:, used], bound_loss)
+        named = ready.losses
         found = _search(forms, ready.samples, bound_loss, proposals, frozenset(held), effort)
         found, judged = settle(found, Problem(ready.samples, bound_loss, found[0].problem.chart), named, effort)
         errors = judged.errors
@@ -234,16 +237,16 @@ def evaluate(
     if channels(model) not in (1, table.channels):
         raise ValueError(f"the model has {channels(model)} channels and the table {table.channels}")
     with jax.enable_x64(True):
-        ready = prepare(table, max_angle, measure)
-        named = _named_losses(table.planes[:, ready.used], None if loss is None else named_loss(loss))
+        ready = prepare(table, max_angle, measure, LOSSES["log"] if loss is None else named_loss(loss))
+        named = ready.losses
         values = np.asarray(_errors(model, ready.samples, named))
     return {e.name: float(v) for e, v in zip(named, values, strict=True)}
 
 
-def _named_losses(values: NDArray[np.float64], own: Loss | None) -> tuple[Loss, ...]:
+def _named_losses(values: NDArray[np.float64], own: Loss) -> tuple[Loss, ...]:
     """Every named loss, ready for these measured values, and one's own where it is not among them."""
     named = tuple(loss.bind(values) for loss in LOSSES.values())
-    return named if own is None or own.name in LOSSES else (*named, own.bind(values))
+    return named if own.name in LOSSES else (*named, own)
 
 
 def _search(

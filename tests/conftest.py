@@ -52,3 +52,39 @@ def merl():
     module = importlib.util.module_from_spec(spec)
     spec.loader.exec_module(module)
     return module.table
+
+
+@pytest.fixture(scope="session")
+def measured():
+    """A small table that one model of ``fits`` is the truth of."""
+    import brdfit
+
+    from .report_cases import GGX, half_grid, table_of
+
+    return table_of(brdfit.model("gtr", **GGX), half_grid())
+
+
+@pytest.fixture(scope="session")
+def fits():
+    """Three results for ``measured``, one of them failed."""
+    from .report_cases import three_fits
+
+    return three_fits()
+
+
+@pytest.fixture(scope="session")
+def evidence(measured, fits):
+    """What the plots of a report of ``fits`` are drawn from."""
+    from brdfit.reports.gather import gather
+
+    return gather(measured, fits)
+
+
+@pytest.fixture(scope="session")
+def report(tmp_path_factory, fits, evidence):
+    """The page of ``fits``."""
+    from brdfit.reports.write import write_report
+
+    from .report_cases import ENVIRONMENT
+
+    return write_report(tmp_path_factory.mktemp("report"), fits, [evidence], ENVIRONMENT).read_text()

@@ -4,34 +4,12 @@ import math
 import re
 from dataclasses import replace
 
-import brdfit
 import numpy as np
 import pytest
 from brdfit.reports.gather import gather
 from brdfit.reports.write import rebuild_report, write_fits, write_report
 
-from .report_cases import ENVIRONMENT, GGX, WARD, Reader, failed, fit_of, half_grid, table_of, three_fits
-
-
-@pytest.fixture(scope="module")
-def measured():
-    return table_of(brdfit.model("gtr", **GGX), half_grid())
-
-
-@pytest.fixture(scope="module")
-def fits():
-    return three_fits()
-
-
-@pytest.fixture(scope="module")
-def evidence(measured, fits):
-    return gather(measured, fits)
-
-
-@pytest.fixture(scope="module")
-def report(tmp_path_factory, fits, evidence):
-    out = tmp_path_factory.mktemp("report")
-    return write_report(out, fits, [evidence], ENVIRONMENT).read_text()
+from .report_cases import ENVIRONMENT, GGX, WARD, Reader, failed, fit_of, half_grid, table_of
 
 
 def test_headline_names_the_best_and_what_its_error_means(report):

@@ -1,29 +1,12 @@
 """What the plots of a report are drawn from."""
 
-import brdfit
 import numpy as np
-import pytest
 from brdfit.reports.evidence import load_evidence, save_evidence
 from brdfit.reports.gather import gather, interpolate
 from brdfit.reports.write import write_report
 from brdfit.tables import Scattered, SphericalGrid, table
 
-from .report_cases import GGX, WARD, Reader, fit_of, half_grid, table_of, three_fits
-
-
-@pytest.fixture(scope="module")
-def measured():
-    return table_of(brdfit.model("gtr", **GGX), half_grid())
-
-
-@pytest.fixture(scope="module")
-def fits():
-    return three_fits()
-
-
-@pytest.fixture(scope="module")
-def evidence(measured, fits):
-    return gather(measured, fits)
+from .report_cases import WARD, Reader, fit_of, table_of
 
 
 def spherical():

@@ -5,35 +5,13 @@ import re
 import subprocess
 import sys
 
-import brdfit
 import pytest
 from brdfit.errors import InputError
 from brdfit.reports.evidence import load_evidence, save_evidence
 from brdfit.reports.gather import gather
 from brdfit.reports.write import read_fits, rebuild_report, write_fits, write_report
 
-from .report_cases import ENVIRONMENT, GGX, Reader, half_grid, table_of, three_fits
-
-
-@pytest.fixture(scope="module")
-def measured():
-    return table_of(brdfit.model("gtr", **GGX), half_grid())
-
-
-@pytest.fixture(scope="module")
-def fits():
-    return three_fits()
-
-
-@pytest.fixture(scope="module")
-def evidence(measured, fits):
-    return gather(measured, fits)
-
-
-@pytest.fixture(scope="module")
-def report(tmp_path_factory, fits, evidence):
-    out = tmp_path_factory.mktemp("report")
-    return write_report(out, fits, [evidence], ENVIRONMENT).read_text()
+from .report_cases import ENVIRONMENT, Reader
 
 
 def test_same_input_same_bytes(tmp_path, measured, fits, evidence, report):
