@@ -11,14 +11,13 @@ from dataclasses import dataclass
 from functools import cache
 from typing import Any
 
-import jax.numpy as jnp
 import numpy as np
 from numpy.typing import NDArray
 
 from ..fitting import Fit
 from ..geometry import Geometry
 from ..models import BRDF, parameter_values
-from ..models.masking.smith import NDF, NODES, REACH
+from ..models.masking.smith import NDF, NODES, REACH, Rule, smith_correlated, smith_separable
 from ..quadrature import gauss_legendre, smith_kernel
 from .evaluation import Evaluation, direct
 from .exchange import MASKINGS, PARTS, Field, Masking, exchanged
@@ -27,8 +26,6 @@ from .tabulated import from_table, tabulate
 from .timing import Timing, interleaved
 
 Reals = NDArray[np.float64]
-Rule = tuple[Reals, Reals]
-"""cos^2 t and the weights (sin t - t cos t) sin t dt."""
 
 COUNTS = (8, 16, 32, 64, 128, NODES)
 PLAIN_COUNTS = (4, 8, 16, 32)
@@ -61,30 +58,15 @@ class Quadrature:
     """Change of the error, relative, against the package's own rule on the same sample."""
 
 
-def lambda_by(rule: Rule, lobe: NDF, cosine: Field) -> Field:
-    """Lambda at cos(theta) in (0, 1] by a rule of nodes in t: the sum of :func:`~brdfit.models.masking.smith_lambda`."""
-    cos2_t, weight = (jnp.asarray(a, cosine.dtype) for a in rule)
-    c2 = (cosine * cosine)[..., None]
-    s2 = (1 - cosine)[..., None] * (1 + cosine)[..., None]
-    norm = c2 + s2 * cos2_t
-    cos2_m = jnp.maximum(s2 * cos2_t / norm, float(np.finfo(cosine.dtype).tiny) ** 0.25)
-    return 2 * c2[..., 0] * s2[..., 0] * jnp.sum(weight * lobe(c2 / norm, cos2_m) / norm**2, -1)
-
-
-def even(nodes: int, reach: float) -> Rule:
-    """The package's rule."""
-    cos2_t, weight = smith_kernel(nodes, reach)[:2]
-    return cos2_t, weight
-
-
 def plain(nodes: int, reach: float = REACH) -> Rule:
-    """Gauss-Legendre in t."""
+    """Gauss-Legendre in t, in the form of :func:`brdfit.quadrature.smith_kernel`."""
     x, w = gauss_legendre(nodes)
     t = np.pi / 2 * x
-    return np.cos(t) ** 2, np.pi / 2 * w * (np.sin(t) - t * np.cos(t)) * np.sin(t)
+    sine, cosine, width = np.sin(t), np.cos(t), np.pi / 2 * w
+    return cosine**2, width * (sine - t * cosine) * sine, width * t * cosine * sine, width * cosine**2 / 2
 
 
-RULES: dict[str, Callable[[int, float], Rule]] = {"even in u": even, "Gauss-Legendre in t": plain}
+RULES: dict[str, Callable[[int, float], Rule]] = {"even in u": smith_kernel, "Gauss-Legendre in t": plain}
 
 
 @cache
@@ -92,10 +74,9 @@ def masking_by(rule: str, nodes: int, correlated: bool) -> Masking:
     """Smith masking with a rule of so many nodes."""
 
     def masking(lobe: NDF, g: Geometry) -> Field:
-        nodes_of = RULES[rule](nodes, REACH if nodes == REFERENCE else getattr(lobe, "smith_reach", REACH))
-        light, viewer = g.at_polar(lambda c: lambda_by(nodes_of, lobe, c))
-        seen = 1 + light + viewer if correlated else (1 + light) * (1 + viewer)
-        return 1 / (4 * g.cos_i * g.cos_o * seen)
+        reach = REACH if nodes == REFERENCE else getattr(lobe, "smith_reach", REACH)
+        form = smith_correlated if correlated else smith_separable
+        return form(lobe, g, RULES[rule](nodes, reach))
 
     return masking
 
@@ -136,4 +117,4 @@ def quadratures(fits: Sequence[Fit], sample: Sample, losses: Sequence[str]) -> l
     return out
 
 
-__all__ = ["Quadrature", "lambda_by", "plain", "quadratures", "with_rule"]
+__all__ = ["Quadrature", "plain", "quadratures", "with_rule"]
