@@ -64,6 +64,11 @@ class Chart:
         """Coordinates that all channels share."""
         return tuple(c for c in self.coordinates if not c.per_channel)
 
+    @property
+    def own_lobes(self) -> bool:
+        """Whether channels differ in more than what the BRDF is affine in."""
+        return any(not c.linear for c in self.channel)
+
     def vector(self, channels: int) -> list[tuple[Coordinate, int | None]]:
         """Order of the vector a solver works on: each channel's coordinates, channel by channel, then the shared ones."""
         own = [(c, k) for k in range(channels) for c in self.channel]

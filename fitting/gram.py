@@ -45,11 +45,6 @@ class Problem(eqx.Module):
         return self.samples.channels
 
     @property
-    def own_lobes(self) -> bool:
-        """Whether channels differ in more than what the BRDF is affine in."""
-        return any(not c.linear for c in self.chart.channel)
-
-    @property
     def size(self) -> int:
         """Length n of the vector of coordinates."""
         return self.channels * len(self.chart.channel) + len(self.chart.shared)
@@ -139,7 +134,7 @@ def polar_tables(problem: Problem, x: Vector) -> _Tables:
     own, shared = problem.chart.split(x, problem.channels)
     g, _, _ = problem.samples.block(jnp.zeros((), int))
     tables: _Tables
-    if problem.own_lobes:
+    if problem.chart.own_lobes:
         tables = jax.vmap(lambda o: _tables(problem.chart, list(o), list(shared), g))(own)
     else:
         tables = _tables(problem.chart, list(own[0]), list(shared), g)
@@ -174,8 +169,8 @@ def _joint_residual(
     """Weighted residuals ``[m, *cells]`` and BRDF values ``[C, *cells]`` of all channels."""
     chart, channels = form
     own, shared = chart.split(jnp.stack(y), channels)
-    own_lobes = any(not c.linear for c in chart.channel)
-    each: Any = jax.vmap(lambda o, t: _values(chart, list(o), list(shared), t, g), in_axes=(0, 0 if own_lobes else None))
+    axes = (0, 0 if chart.own_lobes else None)
+    each: Any = jax.vmap(lambda o, t: _values(chart, list(o), list(shared), t, g), in_axes=axes)
     f = each(own, tables)
     flat_f, flat_m = (jnp.moveaxis(v, 0, -1).reshape(-1, channels) for v in (f, measured))
     r = jnp.asarray(loss(flat_f, flat_m, g.flat())).reshape(root.size, -1)
@@ -201,7 +196,7 @@ def channel_rows(
         )
         return jnp.stack([*(jnp.broadcast_to(c, r.shape) for c in columns), r]), f
 
-    rows: tuple[Array, Array] = jax.vmap(one, in_axes=(0, 0 if problem.own_lobes else None, 0))(own, tables, measured)
+    rows: tuple[Array, Array] = jax.vmap(one, in_axes=(0, 0 if problem.chart.own_lobes else None, 0))(own, tables, measured)
     return rows
 
 
