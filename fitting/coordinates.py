@@ -174,8 +174,8 @@ def _gtr_chart(narrow: bool) -> Chart:
 def _abc_chart() -> Chart:
     """The lobe's scale by specular F(0), and ior - 1 by its logarithm.
 
-    F(0) runs from 1e-7 to 1 with the index; specular alone would have to run against it by as much. F/F(0) rises less and
-    less towards grazing up to an index of about 9 and more again beyond it, where conductors would lie: there it folds.
+    F(0) runs from 1e-7 to 1 with the index; specular alone would have to run against it by as much. F/F(0) at some
+    fixed angle falls with the index up to about 9 and returns to 1 beyond it: there it folds.
     """
     plain = plain_chart(ABC)
 

@@ -195,7 +195,6 @@ def minimise(
     size = jnp.sum(columns**2, 0) * cost
     moves = box.free & ~outward & (size > 0)
     cosine = jnp.where(moves, jnp.abs(gradient) / jnp.sqrt(jnp.where(moves, size, 1.0)), 0.0)
-    stopped = jnp.asarray(solution.result == optx.RESULTS.successful)
     stopped = solution.result == optx.RESULTS.successful
     return Minimum(x, cost, jnp.max(cosine, initial=0.0), solution.stats["num_steps"], stopped, _scale(columns, x))
 
