@@ -31,17 +31,17 @@ class PublishedSGD(BRDF):
     name: ClassVar[str] = "published_sgd"
     references: ClassVar[tuple[str, ...]] = ("bagher2012",)
 
-    diffuse: Float[Array, "C"] = diffuse_parameter()
-    specular: Float[Array, "C"] = _each("scale of the lobe", NOT_NEGATIVE)
-    alpha: Float[Array, "C"] = _each("lobe width (mean square slope)", POSITIVE)
-    p: Float[Array, "C"] = _each("fall-off of the tail")
-    f0: Float[Array, "C"] = _each("Fresnel constant")
-    f1: Float[Array, "C"] = _each("Fresnel linear term")
-    normaliser: Float[Array, "C"] = _each("K, equal to 1/(alpha Gamma(1 - p, alpha)) up to rounding", POSITIVE)
-    lam: Float[Array, "C"] = _each("Lambda of G1", POSITIVE)
-    log_c: Float[Array, "C"] = _each("ln c of G1, c in rad^-k")
-    k: Float[Array, "C"] = _each("k of G1", POSITIVE)
-    theta0: Float[Array, "C"] = _each("polar angle where masking sets in", unit="rad")
+    diffuse: Float[Array, " C"] = diffuse_parameter()
+    specular: Float[Array, " C"] = _each("scale of the lobe", NOT_NEGATIVE)
+    alpha: Float[Array, " C"] = _each("lobe width (mean square slope)", POSITIVE)
+    p: Float[Array, " C"] = _each("fall-off of the tail")
+    f0: Float[Array, " C"] = _each("Fresnel constant")
+    f1: Float[Array, " C"] = _each("Fresnel linear term")
+    normaliser: Float[Array, " C"] = _each("K, equal to 1/(alpha Gamma(1 - p, alpha)) up to rounding", POSITIVE)
+    lam: Float[Array, " C"] = _each("Lambda of G1", POSITIVE)
+    log_c: Float[Array, " C"] = _each("ln c of G1, c in rad^-k")
+    k: Float[Array, " C"] = _each("k of G1", POSITIVE)
+    theta0: Float[Array, " C"] = _each("polar angle where masking sets in", unit="rad")
 
     def masking(self, theta: Float[Array, "..."]) -> Float[Array, "..."]:
         """G1 at polar angles in radians."""

@@ -24,7 +24,7 @@ class Minnaert(brdfit.BRDF):
 
     name: ClassVar[str] = "minnaert"
 
-    albedo: Float[Array, "C"] = brdfit.parameter("scale; the albedo at normal incidence", per_channel=True, linear=True)
+    albedo: Float[Array, " C"] = brdfit.parameter("scale; the albedo at normal incidence", per_channel=True, linear=True)
     k: Float[Array, ""] = brdfit.parameter("darkening towards the limb", search=(0.1, 5), default=1.0, log=True)
 
     def evaluate(self, g: brdfit.Geometry) -> Array:

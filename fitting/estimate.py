@@ -25,7 +25,7 @@ _statistics = program(statistics)
 
 
 @program
-def _parameters(chart: Chart, x: Float[Any, "n"], channels: int) -> tuple[dict[str, Array], dict[str, Array]]:
+def _parameters(chart: Chart, x: Float[Any, " n"], channels: int) -> tuple[dict[str, Array], dict[str, Array]]:
     """Parameters ``[C]`` of a vector of coordinates, and their derivatives ``[C, n]``."""
 
     def values(y: Array) -> dict[str, Array]:

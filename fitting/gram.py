@@ -27,7 +27,7 @@ from .coordinates import Chart
 from .losses import Loss
 from .samples import Samples
 
-Vector = Float[Array, "n"]
+Vector = Float[Array, " n"]
 
 
 class Problem(eqx.Module):
@@ -179,7 +179,7 @@ def _joint_residual(
 
 def channel_rows(
     problem: Problem, x: Vector, tables: _Tables, g: Geometry, measured: Array, weight: Array, twice: Sequence[int] = ()
-) -> tuple[Float[Array, "C k+s+q+1 *cells"], Float[Array, "C *cells"]]:
+) -> tuple[Float[Array, "C k+s+q+1 *cells"], Float[Array, " C *cells"]]:
     """Weighted rows [J r] of a block, channel by channel, for a loss that treats channels separately; and the values.
 
     Between J and r lie the second derivatives by the q shared coordinates ``twice``, counted among the shared ones.
@@ -202,7 +202,7 @@ def channel_rows(
 
 def joint_rows(
     problem: Problem, x: Vector, tables: _Tables, g: Geometry, measured: Array, weight: Array, twice: Sequence[int] = ()
-) -> tuple[Float[Array, "n+q+1 m *cells"], Float[Array, "C *cells"]]:
+) -> tuple[Float[Array, "n+q+1 m *cells"], Float[Array, " C *cells"]]:
     """As :func:`channel_rows`, of all channels at once, for a loss of any form; m residuals a cell."""
     root = _root_weight(problem.loss, g, weight)
     form = problem.chart, problem.channels
@@ -214,13 +214,13 @@ def joint_rows(
     return jnp.stack([*columns, r]), f
 
 
-def _products(rows: Float[Array, "m *cells"]) -> Float[Array, "m m"]:
+def _products(rows: Float[Array, " m *cells"]) -> Float[Array, "m m"]:
     """Rows times rows, summed over the cells."""
     r = rows.reshape(rows.shape[0], -1)
     return r @ r.T
 
 
-def _band_products(rows: Float[Array, "m *cells"], samples: Samples) -> Float[Array, "*bands m m"]:
+def _band_products(rows: Float[Array, " m *cells"], samples: Samples) -> Float[Array, "*bands m m"]:
     """Rows times rows, summed over the cells of each angular band."""
     m, shape = rows.shape[0], samples.banded
     within = [a for a in range(len(shape)) if a not in samples.band_axes]
@@ -276,7 +276,7 @@ def gram(problem: Problem, x: Vector, span: Span) -> Float[Array, "n+1 n+1"]:
     return _gram(problem, x, span, ())
 
 
-def curved_gram(problem: Problem, x: Vector, span: Span) -> tuple[Float[Array, "n+1 n+1"], Float[Array, "q"]]:
+def curved_gram(problem: Problem, x: Vector, span: Span) -> tuple[Float[Array, "n+1 n+1"], Float[Array, " q"]]:
     """G, and sum w r d^2r/dx^2 of the q coordinates that fold."""
     folds = [i for i, c in enumerate(problem.chart.shared) if c.folds]
     n, q = problem.size, len(folds)
@@ -311,11 +311,11 @@ class Statistics(NamedTuple):
     middle: Float[Array, "n n"]
     """Sum over cells of s s^T, s = sum_c w r J the gradient of a cell: the middle of the sandwich (White 1980, eq. 3). The
     channels of a cell are summed first, so that noise which they share is counted."""
-    errors: Float[Array, "losses"]
+    errors: Float[Array, " losses"]
     """sqrt(sum w r^2 / sum w) of each loss asked for."""
 
 
-def statistics(problem: Problem, x: Float[Any, "n"], losses: tuple[Loss, ...] = ()) -> Statistics:
+def statistics(problem: Problem, x: Float[Any, " n"], losses: tuple[Loss, ...] = ()) -> Statistics:
     """What error bars are made of, and the error under each loss, over all cells and channels."""
     n, k, c = problem.size, len(problem.chart.channel), problem.channels
     tables = polar_tables(problem, x)
@@ -384,7 +384,7 @@ def gram_residual(problem: Problem, span: Span) -> Callable[[Vector], Array]:
 
 
 def _loss_sums(
-    losses: tuple[Loss, ...], f: Float[Array, "C *cells"], measured: Float[Array, "C *cells"], weight: Array, g: Geometry
+    losses: tuple[Loss, ...], f: Float[Array, " C *cells"], measured: Float[Array, " C *cells"], weight: Array, g: Geometry
 ) -> Float[Array, "losses 2"]:
     """sum w r^2 and sum w of each loss over a block."""
     out = [jnp.zeros((0, 2))]
@@ -400,7 +400,7 @@ def _loss_sums(
     return jnp.concatenate(out)
 
 
-def loss_errors(model: Any, samples: Samples, losses: tuple[Loss, ...]) -> Float[Array, "losses"]:
+def loss_errors(model: Any, samples: Samples, losses: tuple[Loss, ...]) -> Float[Array, " losses"]:
     """sqrt(sum w r^2 / sum w) of each loss over all fitted cells and channels."""
 
     def one(g: Geometry, measured: Array, weight: Array) -> Array:

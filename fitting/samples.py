@@ -41,10 +41,10 @@ class Blocks(eqx.Module):
     geometry: Geometry
     measured: Float[Array, "blocks C *cells"]
     """BRDF in 1/sr; 0 where not fitted."""
-    weight: Float[Array, "blocks *cells"]
+    weight: Float[Array, " blocks *cells"]
     """Share of the measure, 0 where not fitted; sums to 1."""
 
-    def at(self, i: Array) -> tuple[Geometry, Float[Array, "C *cells"], Float[Array, "*cells"]]:
+    def at(self, i: Array) -> tuple[Geometry, Float[Array, " C *cells"], Float[Array, "*cells"]]:
         """Geometry, measured values and weights of block i."""
         geometry = jax.tree.map(lambda leaf: leaf[0] if leaf.shape[0] == 1 else leaf[i], self.geometry)
         return geometry, self.measured[i], self.weight[i]
@@ -65,7 +65,7 @@ class Samples(eqx.Module):
     """Axes of ``banded`` that number the bands; the others lie within one."""
     nodes: Blocks | None = None
     """The table with its rows along phi_d compressed, in blocks of the same shape."""
-    remainder: Float[Array, "C"] | None = None
+    remainder: Float[Array, " C"] | None = None
     """What the compressed blocks leave out of the cost, a constant."""
 
     @property
@@ -83,7 +83,7 @@ class Samples(eqx.Module):
         """Number of compressed blocks."""
         return 0 if self.nodes is None else self.nodes.weight.shape[0]
 
-    def block(self, i: Array) -> tuple[Geometry, Float[Array, "C *cells"], Float[Array, "*cells"]]:
+    def block(self, i: Array) -> tuple[Geometry, Float[Array, " C *cells"], Float[Array, "*cells"]]:
         """Geometry, measured values and weights of block i; compressed blocks are numbered first."""
         nodes, count = self.nodes, self.compressed
         if nodes is None:

@@ -44,7 +44,7 @@ class Stage(eqx.Module):
 
 
 @program
-def solve(problem: Problem, x: Float[Any, "n"], box: Box, stage: Stage) -> Minimum:
+def solve(problem: Problem, x: Float[Any, " n"], box: Box, stage: Stage) -> Minimum:
     """Minimise from x. One program for coarse and whole tables and for any bounds."""
     return minimise(gram_residual(problem, stage.span), x, box, stage.rtol, stage.damping, MAX_STEPS)
 

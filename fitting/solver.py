@@ -16,7 +16,7 @@ import jax.numpy as jnp
 import optimistix as optx
 from jaxtyping import Array, Bool, Float
 
-Vector = Float[Array, "n"]
+Vector = Float[Array, " n"]
 
 ROUNDING = 1e-14
 """Residual, relative to what the coordinates do to it, that is rounding: 45 units in the last place. Below it the cost
@@ -26,9 +26,9 @@ goes up and down at random, and a search for less goes on as long as it may."""
 class Box(eqx.Module):
     """Bounds of a vector, and which of its elements may move at all."""
 
-    lower: Float[Any, "n"]
-    upper: Float[Any, "n"]
-    free: Bool[Any, "n"]
+    lower: Float[Any, " n"]
+    upper: Float[Any, " n"]
+    free: Bool[Any, " n"]
 
 
 class _State(eqx.Module):

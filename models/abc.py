@@ -28,8 +28,8 @@ class ABC(BRDF):
     name: ClassVar[str] = "abc"
     references: ClassVar[tuple[str, ...]] = ("low2012", "church1990", "cook1982")
 
-    diffuse: Float[Array, "C"] = diffuse_parameter()
-    specular: Float[Array, "C"] = parameter(
+    diffuse: Float[Array, " C"] = diffuse_parameter()
+    specular: Float[Array, " C"] = parameter(
         "scale of the lobe", per_channel=True, linear=True, valid=NOT_NEGATIVE, default=1.0
     )
     b: Float[Array, ""] = parameter("inverse width of the lobe", valid=POSITIVE, search=(1e-2, 1e9), default=100, log=True)

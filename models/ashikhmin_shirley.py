@@ -41,8 +41,8 @@ class AshikhminShirley(BRDF):
     name: ClassVar[str] = "ashikhmin_shirley"
     references: ClassVar[tuple[str, ...]] = ("ashikhmin2000", "schlick1994")
 
-    diffuse: Float[Array, "C"] = diffuse_parameter()
-    specular: Float[Array, "C"] = _specular()
+    diffuse: Float[Array, " C"] = diffuse_parameter()
+    specular: Float[Array, " C"] = _specular()
     exponent: Float[Array, ""] = _exponent("Phong exponent of the lobe")
 
     def evaluate(self, g: Geometry) -> Float[Array, "..."]:
@@ -61,8 +61,8 @@ class AshikhminShirleyAnisotropic(BRDF):
     references: ClassVar[tuple[str, ...]] = ("ashikhmin2000", "schlick1994")
     anisotropic: ClassVar[bool] = True
 
-    diffuse: Float[Array, "C"] = diffuse_parameter()
-    specular: Float[Array, "C"] = _specular()
+    diffuse: Float[Array, " C"] = diffuse_parameter()
+    specular: Float[Array, " C"] = _specular()
     exponent_x: Float[Array, ""] = _exponent("Phong exponent along the tangent")
     exponent_y: Float[Array, ""] = _exponent("Phong exponent along the bitangent")
 

@@ -27,8 +27,8 @@ class GTR(BRDF):
     name: ClassVar[str] = "gtr"
     references: ClassVar[tuple[str, ...]] = ("burley2012", "schlick1994", "smith1967", "heitz2014")
 
-    diffuse: Float[Array, "C"] = diffuse_parameter()
-    specular: Float[Array, "C"] = parameter(
+    diffuse: Float[Array, " C"] = diffuse_parameter()
+    specular: Float[Array, " C"] = parameter(
         "reflectance at normal incidence, F0", per_channel=True, linear=True, valid=NOT_NEGATIVE, search=(0, 1), default=0.04
     )
     alpha: Float[Array, ""] = parameter("lobe width", valid=POSITIVE, search=(1e-9, 10), default=0.1, log=True)

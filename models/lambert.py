@@ -18,7 +18,7 @@ class Lambert(BRDF):
     name: ClassVar[str] = "lambert"
     references: ClassVar[tuple[str, ...]] = ("lambert1760",)
 
-    diffuse: Float[Array, "C"] = diffuse_parameter()
+    diffuse: Float[Array, " C"] = diffuse_parameter()
 
     def evaluate(self, g: Geometry) -> Float[Array, "..."]:
         """Value in 1/sr."""

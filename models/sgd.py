@@ -27,16 +27,16 @@ class SGD(BRDF):
     name: ClassVar[str] = "sgd"
     references: ClassVar[tuple[str, ...]] = ("bagher2012", "smith1967", "heitz2014")
 
-    diffuse: Float[Array, "C"] = diffuse_parameter()
-    specular: Float[Array, "C"] = parameter(
+    diffuse: Float[Array, " C"] = diffuse_parameter()
+    specular: Float[Array, " C"] = parameter(
         "scale of the lobe", per_channel=True, linear=True, valid=NOT_NEGATIVE, search=(1e-12, float("inf")), default=0.5
     )
-    alpha: Float[Array, "C"] = parameter(
+    alpha: Float[Array, " C"] = parameter(
         "lobe width (mean square slope)", per_channel=True, valid=POSITIVE, search=(1e-7, 30), default=0.1, log=True
     )
-    p: Float[Array, "C"] = parameter("fall-off of the tail", per_channel=True, valid=REAL, search=(-10, 60), default=0.5)
-    f0: Float[Array, "C"] = parameter("Fresnel constant", per_channel=True, linear=True, valid=REAL, default=0.04)
-    f1: Float[Array, "C"] = parameter("Fresnel linear term", per_channel=True, linear=True, valid=REAL, default=0.0)
+    p: Float[Array, " C"] = parameter("fall-off of the tail", per_channel=True, valid=REAL, search=(-10, 60), default=0.5)
+    f0: Float[Array, " C"] = parameter("Fresnel constant", per_channel=True, linear=True, valid=REAL, default=0.04)
+    f1: Float[Array, " C"] = parameter("Fresnel linear term", per_channel=True, linear=True, valid=REAL, default=0.0)
 
     def evaluate(self, g: Geometry) -> Float[Array, "..."]:
         """Value in 1/sr."""

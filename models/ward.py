@@ -32,8 +32,8 @@ class Ward(BRDF):
     name: ClassVar[str] = "ward"
     references: ClassVar[tuple[str, ...]] = ("ward1992",)
 
-    diffuse: Float[Array, "C"] = diffuse_parameter()
-    specular: Float[Array, "C"] = _specular()
+    diffuse: Float[Array, " C"] = diffuse_parameter()
+    specular: Float[Array, " C"] = _specular()
     alpha: Float[Array, ""] = _width("lobe width (rms slope times sqrt 2)")
 
     def evaluate(self, g: Geometry) -> Float[Array, "..."]:
@@ -51,8 +51,8 @@ class WardAnisotropic(BRDF):
     references: ClassVar[tuple[str, ...]] = ("ward1992",)
     anisotropic: ClassVar[bool] = True
 
-    diffuse: Float[Array, "C"] = diffuse_parameter()
-    specular: Float[Array, "C"] = _specular()
+    diffuse: Float[Array, " C"] = diffuse_parameter()
+    specular: Float[Array, " C"] = _specular()
     alpha_x: Float[Array, ""] = _width("lobe width along the tangent")
     alpha_y: Float[Array, ""] = _width("lobe width along the bitangent")
 

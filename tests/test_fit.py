@@ -229,8 +229,8 @@ class Cosine(BRDF):
 
     name = "cosine"
 
-    diffuse: Float[Array, "C"] = parameter("body", per_channel=True, linear=True, default=0.1)
-    scale: Float[Array, "C"] = parameter("lobe", per_channel=True, linear=True, default=0.1)
+    diffuse: Float[Array, " C"] = parameter("body", per_channel=True, linear=True, default=0.1)
+    scale: Float[Array, " C"] = parameter("lobe", per_channel=True, linear=True, default=0.1)
     power: Float[Array, ""] = parameter("exponent", search=(0.1, 1e4), default=10.0, log=True)
 
     def evaluate(self, g):

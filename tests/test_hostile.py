@@ -190,8 +190,8 @@ class Twins(BRDF):
 
     name = "twins"
 
-    first: Float[Array, "C"] = parameter("a body", per_channel=True, linear=True, default=0.1)
-    second: Float[Array, "C"] = parameter("the same again", per_channel=True, linear=True, default=0.1)
+    first: Float[Array, " C"] = parameter("a body", per_channel=True, linear=True, default=0.1)
+    second: Float[Array, " C"] = parameter("the same again", per_channel=True, linear=True, default=0.1)
     width: Float[Array, ""] = parameter("lobe", search=(1e-3, 10), default=0.3, log=True)
 
     def evaluate(self, g):
@@ -205,7 +205,7 @@ class Product(BRDF):
 
     scale: Float[Array, ""] = parameter("a factor", search=(1e-6, 1e6), default=1.0, log=True)
     gain: Float[Array, ""] = parameter("another", search=(1e-6, 1e6), default=1.0, log=True)
-    body: Float[Array, "C"] = parameter("body", per_channel=True, linear=True, default=0.1)
+    body: Float[Array, " C"] = parameter("body", per_channel=True, linear=True, default=0.1)
 
     def evaluate(self, g):
         return self.body + self.scale * self.gain * g.cos_h**20
@@ -216,7 +216,7 @@ class Idle(BRDF):
 
     name = "idle"
 
-    body: Float[Array, "C"] = parameter("body", per_channel=True, linear=True, default=0.1)
+    body: Float[Array, " C"] = parameter("body", per_channel=True, linear=True, default=0.1)
     nothing: Float[Array, ""] = parameter("no effect", search=(0, 1), default=0.5)
 
     def evaluate(self, g):

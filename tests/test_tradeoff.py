@@ -13,7 +13,7 @@ from brdfit import cli, models
 from brdfit.fitting import Effort
 from brdfit.geometry import from_directions
 from brdfit.models import ndf, parameter_values
-from brdfit.models.masking.smith import REACH, averted_area
+from brdfit.models.masking.smith import NODES, REACH, averted_area
 from brdfit.quadrature import smith_kernel
 from brdfit.stability import oracle
 from brdfit.stability.domain import unit

@@ -53,11 +53,11 @@ class TwoLobes(BRDF):
     name: ClassVar[str] = "two_lobes"
     references: ClassVar[tuple[str, ...]] = ("walter2007", "heitz2014", "oren1994", "schlick1994")
 
-    diffuse: Float[Array, "C"] = diffuse_parameter()
+    diffuse: Float[Array, " C"] = diffuse_parameter()
     sigma: Float[Array, ""] = _shared("roughness of the body", NOT_NEGATIVE, unit="rad")
-    specular: Float[Array, "C"] = _each("reflectance at normal incidence, F0")
+    specular: Float[Array, " C"] = _each("reflectance at normal incidence, F0")
     alpha: Float[Array, ""] = _shared("width of the narrow lobe")
-    haze: Float[Array, "C"] = _each("share of the wide lobe", Interval(0, 1))
+    haze: Float[Array, " C"] = _each("share of the wide lobe", Interval(0, 1))
     alpha_haze: Float[Array, ""] = _shared("width of the wide lobe")
 
     def evaluate(self, g: Geometry) -> Float[Array, "..."]:
@@ -77,10 +77,10 @@ class Retro(BRDF):
     name: ClassVar[str] = "retro"
     references: ClassVar[tuple[str, ...]] = ("walter2007", "heitz2014", "schlick1994")
 
-    diffuse: Float[Array, "C"] = diffuse_parameter()
-    specular: Float[Array, "C"] = _each("reflectance at normal incidence, F0")
+    diffuse: Float[Array, " C"] = diffuse_parameter()
+    specular: Float[Array, " C"] = _each("reflectance at normal incidence, F0")
     alpha: Float[Array, ""] = _shared("lobe width")
-    retro: Float[Array, "C"] = _each("scale of the return")
+    retro: Float[Array, " C"] = _each("scale of the return")
     width: Float[Array, ""] = _shared("width of the return, as tan(theta_d)")
 
     def evaluate(self, g: Geometry) -> Float[Array, "..."]:
@@ -100,10 +100,10 @@ class Coated(BRDF):
     name: ClassVar[str] = "coated"
     references: ClassVar[tuple[str, ...]] = ("walter2007", "heitz2014", "cook1982", "schlick1994")
 
-    diffuse: Float[Array, "C"] = diffuse_parameter()
-    specular: Float[Array, "C"] = _each("reflectance of the base at normal incidence, F0")
-    alpha: Float[Array, "C"] = _each("lobe width of the base", POSITIVE)
-    ior: Float[Array, "C"] = _each("index of refraction of the coat", Interval(1, open_lower=True))
+    diffuse: Float[Array, " C"] = diffuse_parameter()
+    specular: Float[Array, " C"] = _each("reflectance of the base at normal incidence, F0")
+    alpha: Float[Array, " C"] = _each("lobe width of the base", POSITIVE)
+    ior: Float[Array, " C"] = _each("index of refraction of the coat", Interval(1, open_lower=True))
     coat_alpha: Float[Array, ""] = _shared("lobe width of the coat")
 
     def evaluate(self, g: Geometry) -> Float[Array, "..."]:
