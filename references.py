@@ -39,6 +39,13 @@ REFERENCES: dict[str, str] = {
     "doi:10.2312/EGWR/EGSR07/195-206",
     "blinn1977": "Blinn, J. F. (1977). Models of light reflection for computer synthesized pictures. Computer Graphics"
     " (Proc. SIGGRAPH) 11(2), 192-198. doi:10.1145/965141.563893",
+    "schwenk2011": "Schwenk, K. (2011). A survey of shading models for real-time rendering.",
+    "phong1975": "Phong, B. T. (1975). Illumination for computer generated pictures. Communications of the ACM 18(6), "
+    "311-317. doi:10.1145/360825.360839",
+    "lafortune1994": "Lafortune, E. P., Willems, Y. D. (1994). Using the modified Phong reflectance model for physically "
+    "based rendering. Report CW 197, K.U. Leuven.",
+    "neumann1998": "Neumann, L., Neumann, A. (1998). New simple reflectance models for metals and other specular materials. "
+    "Report TR-186-2-98-17, Vienna University of Technology.",
     "oren1994": "Oren, M., Nayar, S. K. (1994). Generalization of Lambert's reflectance model. Proc. SIGGRAPH 94, "
     "239-246. doi:10.1145/192161.192213",
     "hoffman2013": "Hoffman, N. (2013). Background: physics and math of shading. In Physically Based Shading in Theory "

@@ -10,8 +10,13 @@ from jaxtyping import ArrayLike
 from .abc import ABC
 from .ashikhmin_shirley import AshikhminShirley, AshikhminShirleyAnisotropic
 from .base import BRDF, Interval, Parameter, channels, evaluate_channels, parameter, parameters_of
+from .blinn_phong import BlinnPhong
 from .gtr import GTR
 from .lambert import Lambert
+from .max_phong import MaxPhong
+from .modified_blinn_phong import ModifiedBlinnPhong
+from .modified_phong import ModifiedPhong
+from .phong import Phong
 from .sgd import SGD
 from .ward import Ward, WardAnisotropic
 
@@ -22,6 +27,11 @@ MODELS: dict[str, tuple[type[BRDF], ...]] = {
     "ward": (Ward, WardAnisotropic),
     "ashikhmin_shirley": (AshikhminShirley, AshikhminShirleyAnisotropic),
     "lambert": (Lambert,),
+    "phong": (Phong,),
+    "blinn_phong": (BlinnPhong,),
+    "modified_phong": (ModifiedPhong,),
+    "modified_blinn_phong": (ModifiedBlinnPhong,),
+    "max_phong": (MaxPhong,),
 }
 """Every named model: its isotropic form first, then the anisotropic one where there is one."""
 

@@ -256,7 +256,12 @@ _EXPM1 = Range(-50, 50, 0, log=False, special=(0.0, 1.0, -1.0))
 _LOG1P = Range(-0.99, 50, 0, log=False, special=(0.0, 0.1, -0.1))
 
 PARTS: tuple[Part, ...] = (
-    *(_model(c, c.__name__ in ("GTR", "SGD")) for variants in models.MODELS.values() for c in variants),
+    *(
+        _model(c, c.__name__ in ("GTR", "SGD"))
+        for variants in models.MODELS.values()
+        for c in variants
+        if c.__name__ in domain.PARAMETERS
+    ),
     _ndf("GTR", "GTR", lambda a, g, s2, c2: ndf.GTR(a, g)(s2, c2)),
     _ndf("SGD", "SGD", lambda a, p, s2, c2: ndf.SGD(a, p)(s2, c2)),
     _ndf("ABC", "ABC", lambda b, c, s2, c2: ndf.ABC(b, c)(s2, c2)),

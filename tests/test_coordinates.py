@@ -8,12 +8,14 @@ import jax
 import jax.numpy as jnp
 import numpy as np
 import pytest
+from brdfit.data.synthetic import RANGES
 from brdfit.fitting.coordinates import charts
 from brdfit.models import MODELS, parameters_of
 from brdfit.models.gtr import GTR
 from brdfit.models.sgd import SGD
 
-FORMS = [cls for classes in MODELS.values() for cls in classes]
+FORMS = [cls for name in RANGES for cls in MODELS[name]]
+"""The models that have charts of their own, and Ward for all those that have the plain one."""
 CASES = [(cls, plain, k) for cls in FORMS for plain in (False, True) for k in range(len(charts(cls, plain)))]
 charted = pytest.mark.parametrize(
     ("cls", "plain", "k"), CASES, ids=[f"{c.__name__}-{'plain' if p else 'chart'}-{k}" for c, p, k in CASES]

@@ -7,7 +7,7 @@ import jax
 import jax.numpy as jnp
 import numpy as np
 import pytest
-from brdfit.data.synthetic import Missing, Relative, generate, material
+from brdfit.data.synthetic import RANGES, Missing, Relative, generate, material
 from brdfit.fitting.compression import row_rules
 from brdfit.fitting.coordinates import charts
 from brdfit.fitting.gram import Problem, Span, curved_gram, factor, gram, gram_residual, statistics
@@ -24,7 +24,7 @@ def luminance(f, m, g):
     return (jnp.log1p(f * g.cos_i[:, None]) - jnp.log1p(m * g.cos_i[:, None])).sum(-1)
 
 
-FORMS = [(name, cls) for name, classes in MODELS.items() for cls in classes]
+FORMS = [(name, cls) for name in (*RANGES, "lambert") for cls in MODELS[name]]
 SOURCES = {"lambert": "ward-05"}
 
 

@@ -1,0 +1,114 @@
+"""The empirical and wave-optical models in 40-digit arithmetic, transcribed from the papers, not from the code under test.
+
+Directions are normalised first: a vector rounded to length is off the unit sphere, where the formulas say nothing. So
+derivatives by a direction are tangential, as those of the code are when projected.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Sequence
+from typing import Any
+
+from mpmath import mp, mpf
+
+DIGITS = 40
+DIFFERENCE_DIGITS = 75
+STEP = mpf(10) ** -30
+
+Vector = Sequence[Any]
+
+
+def _unit(x: Vector) -> list[Any]:
+    length = mp.sqrt(mp.fsum(a * a for a in x))
+    return [a / length for a in x]
+
+
+def _dot(a: Vector, b: Vector) -> Any:
+    return mp.fsum(x * y for x, y in zip(a, b, strict=True))
+
+
+def _half(l: Vector, v: Vector) -> list[Any]:
+    return _unit([a + b for a, b in zip(l, v, strict=True)])
+
+
+def _mirror(l: Vector) -> list[Any]:
+    """R = 2 (N.L) N - L."""
+    return [-l[0], -l[1], l[2]]
+
+
+def _power(base: Any, exponent: Any) -> Any:
+    return base**exponent if base > 0 else mpf(0)
+
+
+def phong(l: Vector, v: Vector, diffuse: Any, specular: Any, exponent: Any) -> Any:
+    """Schwenk (2011), eq. 24, times the factor of Lafortune & Willems (1994)."""
+    return diffuse / mp.pi + specular * (exponent + 2) / (2 * mp.pi) * _power(_dot(_mirror(l), v), exponent) / l[2]
+
+
+def modified_phong(l: Vector, v: Vector, diffuse: Any, specular: Any, exponent: Any) -> Any:
+    """Lafortune & Willems (1994), eq. 7."""
+    return diffuse / mp.pi + specular * (exponent + 2) / (2 * mp.pi) * _power(_dot(_mirror(l), v), exponent)
+
+
+def max_phong(l: Vector, v: Vector, diffuse: Any, specular: Any, exponent: Any) -> Any:
+    """Schwenk (2011), eq. 29, times (e + 1)/(2 pi)."""
+    lobe = _power(_dot(_mirror(l), v), exponent) / max(l[2], v[2])
+    return diffuse / mp.pi + specular * (exponent + 1) / (2 * mp.pi) * lobe
+
+
+def blinn_phong(l: Vector, v: Vector, diffuse: Any, specular: Any, exponent: Any) -> Any:
+    return diffuse / mp.pi + specular * (exponent + 2) / (2 * mp.pi) * _half(l, v)[2] ** exponent
+
+
+def modified_blinn_phong(l: Vector, v: Vector, diffuse: Any, specular: Any, exponent: Any) -> Any:
+    """Schwenk (2011), eq. 28, over the integral of the lobe at normal incidence, int cos^e(t/2) cos(t) sin(t) dt 2 pi."""
+    x = exponent + 4
+    # with u = cos(t/2): sin(t) dt = -4 u du, cos(t) = 2 u^2 - 1, u from 1 down to sqrt(1/2)
+    low = mp.sqrt(mpf(1) / 2)
+    integral = 8 * mp.pi * (2 * (1 - low**x) / x - (1 - low ** (x - 2)) / (x - 2))
+    return diffuse / mp.pi + specular * _half(l, v)[2] ** exponent / integral
+
+
+MODELS: dict[str, Callable[..., Any]] = {
+    "Phong": phong,
+    "ModifiedPhong": modified_phong,
+    "MaxPhong": max_phong,
+    "BlinnPhong": blinn_phong,
+    "ModifiedBlinnPhong": modified_blinn_phong,
+}
+"""By the name of the class under test: functions of unit vectors and parameters."""
+
+
+def _at(name: str, wi: Vector, wo: Vector, numbers: dict[str, Any]) -> Any:
+    return MODELS[name](_unit(wi), _unit(wo), **numbers)
+
+
+def value(name: str, parameters: dict[str, float], wi: Sequence[float], wo: Sequence[float]) -> Any:
+    """The model's value for parameters taken as exact and directions taken as exact but for their length."""
+    with mp.workdps(DIGITS):
+        numbers = {k: mpf(float(x)) for k, x in parameters.items()}
+        return _at(name, [mpf(float(x)) for x in wi], [mpf(float(x)) for x in wo], numbers)
+
+
+def gradient(name: str, parameters: dict[str, float], wi: Sequence[float], wo: Sequence[float]) -> dict[str, Any]:
+    """Derivatives by parameter, and by the components of the directions tangential to the sphere, ``wi_0`` to ``wo_2``."""
+    out = {}
+    with mp.workdps(DIFFERENCE_DIGITS):
+        numbers = {k: mpf(float(x)) for k, x in parameters.items()}
+        ends = [[mpf(float(x)) for x in wi], [mpf(float(x)) for x in wo]]
+        for key, x in numbers.items():
+            step = STEP * (abs(x) or 1)
+            high, low = (_at(name, *ends, {**numbers, key: x + s}) for s in (step, -step))
+            out[key] = (high - low) / (2 * step)
+        for side, label in enumerate(("wi", "wo")):
+            for axis in range(3):
+                moved = []
+                for s in (STEP, -STEP):
+                    pair = [list(e) for e in ends]
+                    pair[side][axis] += s
+                    moved.append(_at(name, *pair, numbers))
+                out[f"{label}_{axis}"] = (moved[0] - moved[1]) / (2 * STEP)
+    return out
+
+
+__all__ = ["MODELS", "gradient", "value"]

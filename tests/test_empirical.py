@@ -1,0 +1,171 @@
+"""Properties of the empirical and wave-optical models, over their table of cases: one program a model and precision."""
+
+from __future__ import annotations
+
+from functools import cache
+from typing import Any
+
+import brdfit
+import jax
+import jax.numpy as jnp
+import numpy as np
+import pytest
+from brdfit import models
+from brdfit.models import BRDF, parameters_of
+from brdfit.reports.physics import hemisphere
+from brdfit.stability import empirical as oracle
+from brdfit.tables import HalfDifferenceGrid, table
+
+from .empirical_cases import EMPIRICAL, SLOPES, WI, WO, Row
+
+rows = pytest.mark.parametrize("row", EMPIRICAL, ids=lambda r: r.name)
+
+N = len(WI)
+UP, LEVEL = np.array([0.6, 0.0, 0.8]), np.array([1.0, 0.0, 0.0])
+BELOW = [(UP, -UP), (-UP, UP), (-UP, -UP), (LEVEL, UP), (UP, LEVEL), (UP * [1, 1, -1], UP * [1, 1, -1])]
+ALL_WI = np.concatenate([WI, WO, [a for a, _ in BELOW]])
+ALL_WO = np.concatenate([WO, WI, [b for _, b in BELOW]])
+"""The directions, the same exchanged, and pairs below the horizon."""
+
+Found = tuple[np.ndarray, dict[str, np.ndarray]]
+
+
+@cache
+def program(cls: type[BRDF]) -> Any:
+    """Values and derivatives by parameters and directions, compiled once a class and precision."""
+
+    def one(m: BRDF, wi: jax.Array, wo: jax.Array) -> jax.Array:
+        return m(wi, wo)[0]
+
+    inner = jax.vmap(jax.value_and_grad(one, (0, 1, 2)), (None, 0, 0))
+    return jax.jit(jax.vmap(inner, (0, None, None)))
+
+
+def evaluate(row: Row, stacked: BRDF, wi: np.ndarray, wo: np.ndarray, dtype: type = np.float64) -> Found:
+    """Values ``[cases, directions]`` and slopes by name."""
+    with jax.enable_x64(dtype is np.float64):
+        stacked = jax.tree.map(lambda x: jnp.asarray(x, dtype), stacked)
+        value, (by_model, by_wi, by_wo) = program(row.model)(stacked, wi.astype(dtype), wo.astype(dtype))
+        assert value.dtype == dtype
+    slopes = {p.name: np.asarray(getattr(by_model, p.name)).reshape(value.shape) for p in parameters_of(row.model)}
+    for name, by in (("wi", by_wi), ("wo", by_wo)):
+        slopes |= {f"{name}_{k}": np.asarray(by)[..., k] for k in range(3)}
+    return np.asarray(value), slopes
+
+
+@cache
+def found(name: str) -> Found:
+    row = next(r for r in EMPIRICAL if r.name == name)
+    return evaluate(row, row.stacked(), ALL_WI, ALL_WO)
+
+
+@rows
+def test_value(row: Row):
+    """Against 40 digits, to 1e-11; 500 values and more."""
+    got = found(row.name)[0][:, :N]
+    want = np.array([[float(oracle.value(row.name, dict(c), a, b)) for a, b in zip(WI, WO, strict=True)] for c in row.cases])
+    assert want.size >= 500
+    error = np.abs(got - want) / (np.abs(want) + 1e-280)
+    w = np.unravel_index(np.nanargmax(error), error.shape)
+    assert np.isfinite(got).all()
+    assert error.max() <= 1e-11, (error.max(), row.cases[w[0]], WI[w[1]], WO[w[1]], got[w], want[w])
+
+
+@rows
+def test_derivative(row: Row):
+    """Against 40-digit difference quotients, to 1e-8 of the larger of the derivative and value/parameter."""
+    value, slopes = found(row.name)
+    for k, case in enumerate(row.cases):
+        for d in SLOPES[k % 2 :: 2] % N:
+            want = oracle.gradient(row.name, dict(case), WI[d], WO[d])
+            got = {n: s[k, d] for n, s in slopes.items()}
+            for end, w in (("wi", WI[d]), ("wo", WO[d])):  # of the gradient only what is tangential means anything
+                g = np.array([got[f"{end}_{i}"] for i in range(3)])
+                got |= {f"{end}_{i}": x for i, x in enumerate(g - w * (w @ g))}
+            for name, slope in got.items():
+                if name not in case and row.kink is not None and row.kink[d]:
+                    continue
+                exact, size = float(want[name]), abs(case.get(name, 1.0))
+                scale = max(abs(exact), value[k, d] / size if size else 0.0)
+                assert abs(slope - exact) <= 1e-8 * scale + 1e-150, (name, slope, exact, case, WI[d], WO[d])
+
+
+@rows
+def test_finite(row: Row):
+    """Values and derivatives at every corner; zero with zero gradient at and below the horizon."""
+    value, slopes = found(row.name)
+    for name, v in {"value": value, **slopes}.items():
+        assert np.isfinite(v).all(), name
+        assert (v[:, 2 * N :] == 0).all(), name
+
+
+@pytest.mark.parametrize("row", [r for r in EMPIRICAL if r.reciprocal], ids=lambda r: r.name)
+def test_reciprocity(row: Row):
+    value = found(row.name)[0]
+    np.testing.assert_allclose(value[:, :N], value[:, N : 2 * N], rtol=1e-12, atol=1e-290)
+
+
+@rows
+def test_single_precision(row: Row):
+    """float32 on numbers that it holds, against float64: 1e-5, and 3e-5 below 1e-12 of the peak, as of the other models."""
+    stacked = row.stacked(np.float32)
+    wi, wo = (w.astype(np.float32) for w in (ALL_WI, ALL_WO))
+    got, slopes = evaluate(row, stacked, wi, wo, np.float32)
+    want, _ = evaluate(row, stacked, wi.astype(float), wo.astype(float))
+    assert np.isfinite(got).all()
+    body = np.array([c.get("diffuse", 0) / np.pi for c in row.cases])[:, None]
+    error = np.abs(got - want) / (np.maximum(np.abs(want), body) + 1e-23)
+    if row.faint is not None:
+        error[:, : 2 * N] = np.where(np.tile(row.faint, 2), 0, error[:, : 2 * N])
+    tolerance = np.where(want > 1e-12 * want.max(1, keepdims=True), 1e-5, 3e-5)
+    w = np.unravel_index(np.argmax(error / tolerance), error.shape)
+    assert (error <= tolerance).all(), (error[w], row.cases[w[0]], wi[w[1]], wo[w[1]], got[w], want[w])
+    for name, slope in slopes.items():
+        assert np.isfinite(slope).all(), name
+
+
+@pytest.mark.parametrize("row", [r for r in EMPIRICAL if r.energy], ids=lambda r: r.name)
+def test_energy(row: Row):
+    """No albedo above 1, by a rule of 64 by 20 half vectors, which is good to 1e-6 for these widths."""
+    with jax.enable_x64(True):
+        stacked = jax.tree.map(jnp.asarray, row.stacked(cases=row.energy))
+        f = jax.jit(jax.vmap(lambda m, a, b: m(a, b)[..., 0], (0, None, None)))
+        for theta in np.radians([0.0, 30.0, 60.0, 80.0, 89.0]):
+            light, viewers, weight = hemisphere(theta)
+            albedo = np.asarray(f(stacked, jnp.asarray(light), jnp.asarray(viewers))) @ weight
+            assert (albedo <= 1 + 1e-6).all(), (np.degrees(theta), albedo)
+
+
+def small_grid(shape: tuple[int, int, int] = (16, 12, 10)) -> HalfDifferenceGrid:
+    edges = [np.linspace(0, 1, n + 1) for n in shape]
+    th, td, pd = edges[0] ** 2 * np.pi / 2, edges[1] * np.pi / 2, edges[2] * np.pi
+    return HalfDifferenceGrid(th[:-1], td[:-1], pd[:-1], th, td, pd)
+
+
+@rows
+def test_search_box(row: Row):
+    """What a fit searches is where the formula is defined, and so are the cases."""
+    for p in parameters_of(row.model):
+        assert all(end in p.valid or np.isinf(end) for end in p.search), p
+    for case in row.cases:
+        models.build(row.model, dict(case))
+
+
+@rows
+def test_recovery(row: Row):
+    """A noiseless table of known parameters, fitted from automatic starts: the parameters come back."""
+    truth = {p.name: p.default for p in parameters_of(row.model)} | dict(row.truth)
+    for p in parameters_of(row.model):
+        if p.per_channel and p.name not in row.truth:
+            truth[p.name] = [truth[p.name], 0.6 * truth[p.name]]
+    brdf = models.model(row.model.name, **truth)
+    grid = small_grid()
+    wi, wo = grid.directions()
+    with jax.enable_x64(True):
+        planes = np.moveaxis(np.asarray(brdf(wi, wo)), -1, 0)
+    planes = np.where((wi[..., 2] <= 0) | (wo[..., 2] <= 0), -1.0, planes)
+    fit = brdfit.fit(table(planes, grid, "truth"), row.model.name)
+    assert fit.converged, fit.reason
+    assert not fit.undetermined
+    for name, true in truth.items():
+        np.testing.assert_allclose(fit.parameters[name], true, rtol=1e-6, err_msg=name)
