@@ -16,6 +16,7 @@ from brdfit.stability import oracle
 
 from . import cases
 from .cases import KINK, TABLE, WI, WO, Row
+from .empirical_cases import EMPIRICAL
 
 rows = pytest.mark.parametrize("row", TABLE, ids=lambda r: r.name)
 
@@ -49,7 +50,7 @@ def slopes(row: Row, wi: np.ndarray, wo: np.ndarray, dtype: type = np.float64) -
 
 
 def test_every_model_has_cases():
-    assert {r.model for r in TABLE} == {v for variants in MODELS.values() for v in variants}
+    assert {r.model for r in (*TABLE, *EMPIRICAL)} == {v for variants in MODELS.values() for v in variants}
     assert {r.name for r in TABLE} == set(oracle.MODELS)
     for r in TABLE:
         for case in r.cases:
