@@ -13,6 +13,7 @@ if TYPE_CHECKING:
     from .fitting import fit_many as fit_many
     from .geometry import Geometry as Geometry
     from .models import BRDF as BRDF
+    from .models import compose as compose
     from .models import model as model
     from .models import parameter as parameter
     from .tables import Table as Table
@@ -31,6 +32,7 @@ _PUBLIC = {
     "InputError": "errors",
     "Table": "tables",
     "Loss": "fitting",
+    "compose": "models",
     "evaluate": "fitting",
     "fit": "fitting",
     "fit_many": "fitting",

@@ -262,17 +262,17 @@ def tradeoff_command(
 def _checked_names(models: str, loss: str) -> list[str]:
     """The models of a list with commas, once each. Raises UsageError for an unknown name of a model or loss."""
     from .fitting.losses import LOSSES
-    from .models import MODELS
+    from .models import variants
 
     names = list(dict.fromkeys(m.strip() for m in models.split(",") if m.strip()))
     if not names:
         raise click.UsageError("--model names no model", click.get_current_context())
-    for kind, given, known in (("model", names, MODELS), ("loss", [loss], LOSSES)):
-        for name in given:
-            if name not in known:
-                raise click.UsageError(
-                    f"unknown {kind} {name!r}: choose from {', '.join(known)}", click.get_current_context()
-                )
+    try:
+        names = list(dict.fromkeys(variants(name)[0].name for name in names))
+    except ValueError as fault:
+        raise click.UsageError(str(fault), click.get_current_context()) from None
+    if loss not in LOSSES:
+        raise click.UsageError(f"unknown loss {loss!r}: choose from {', '.join(LOSSES)}", click.get_current_context())
     return names
 
 

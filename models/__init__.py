@@ -11,11 +11,13 @@ from .abc import ABC
 from .ashikhmin_shirley import AshikhminShirley, AshikhminShirleyAnisotropic
 from .base import BRDF, Interval, Parameter, channels, evaluate_channels, parameter, parameters_of
 from .blinn_phong import BlinnPhong
+from .effects import EFFECTS, compose
 from .gtr import GTR
 from .lambert import Lambert
 from .max_phong import MaxPhong
 from .modified_blinn_phong import ModifiedBlinnPhong
 from .modified_phong import ModifiedPhong
+from .oren_nayar import OrenNayar, OrenNayarFull
 from .phong import Phong
 from .sgd import SGD
 from .ward import Ward, WardAnisotropic
@@ -32,23 +34,30 @@ MODELS: dict[str, tuple[type[BRDF], ...]] = {
     "modified_phong": (ModifiedPhong,),
     "modified_blinn_phong": (ModifiedBlinnPhong,),
     "max_phong": (MaxPhong,),
+    "oren_nayar": (OrenNayar,),
+    "oren_nayar_full": (OrenNayarFull,),
 }
 """Every named model: its isotropic form first, then the anisotropic one where there is one."""
 
 
 def variants(name: str) -> tuple[type[BRDF], ...]:
-    """The classes that go by a name. Raises ValueError for a name that is not in :data:`MODELS`."""
-    try:
+    """The classes that go by a name: of :data:`MODELS`, or effects joined by ``+`` (see :func:`compose`).
+
+    Raises ValueError for any other name, and for effects that do not go together.
+    """
+    if name in MODELS:
         return MODELS[name]
-    except KeyError:
-        raise ValueError(f"unknown model {name!r}: choose from {', '.join(MODELS)}") from None
+    if "+" in name or name in EFFECTS:
+        return (compose(*name.split("+")),)
+    raise ValueError(f"unknown model {name!r}: choose from {', '.join(MODELS)}, or join effects by +: {', '.join(EFFECTS)}")
 
 
 def model(name: str, **parameters: ArrayLike) -> BRDF:
     """A model with given parameters.
 
-    ``name`` is a key of :data:`MODELS`; parameters are scalars or sequences of one value per channel, and scalars
-    broadcast over channels (three if no parameter says otherwise). Models that have an anisotropic form take either set.
+    ``name`` is a key of :data:`MODELS` or effects joined by ``+``; parameters are scalars or sequences of one value per
+    channel, and scalars broadcast over channels (three if no parameter says otherwise). Models that have an anisotropic
+    form take either set.
 
     Raises ValueError for an unknown name and for parameters unknown, missing, or outside the range of the formula.
     """
@@ -105,11 +114,13 @@ def names() -> Iterable[str]:
 
 __all__ = [
     "BRDF",
+    "EFFECTS",
     "MODELS",
     "Interval",
     "Parameter",
     "build",
     "channels",
+    "compose",
     "evaluate_channels",
     "model",
     "names",

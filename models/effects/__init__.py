@@ -1,0 +1,79 @@
+"""Effects of reflection, one file each, and the models that any set of them makes."""
+
+from __future__ import annotations
+
+from collections.abc import Iterable
+from functools import lru_cache
+
+from ..assembled import assemble
+from ..base import Parameter
+from ..parts import Composition, Parts
+from .body import BODY
+from .effect import Effect
+from .fresnel import FRESNEL
+from .lobe import LOBE
+from .masking import MASKING
+from .tail import TAIL
+
+EFFECTS: dict[str, Effect] = {e.name: e for e in (BODY, LOBE, TAIL, FRESNEL, MASKING)}
+"""Every effect by name, in the order in which they are put together and named."""
+
+
+def compose(*effects: str) -> type[Composition]:
+    """The model class that consists of the given effects, names of :data:`EFFECTS` in any order.
+
+    Its name is theirs, joined by ``+`` in the order of :data:`EFFECTS`, and goes wherever a model's name goes. What is not
+    asked for is absent from its program. Equal sets give the same class.
+
+    Raises ValueError for a name that is unknown or given twice, and for an effect without the one that it needs.
+    """
+    return _composed(in_order(effects))
+
+
+def in_order(effects: Iterable[str]) -> tuple[str, ...]:
+    """Names of effects in the order of :data:`EFFECTS`, checked as :func:`compose` says."""
+    given = tuple(effects)
+    for name in given:
+        if name not in EFFECTS:
+            raise ValueError(f"unknown effect {name!r}: choose from {', '.join(EFFECTS)}")
+        if given.count(name) > 1:
+            raise ValueError(f"effect {name!r} is asked for twice")
+        for need in EFFECTS[name].needs:
+            if not set(need.split(" or ")) & set(given):
+                raise ValueError(f"effect {name!r} needs {need}, which is not among {', '.join(given)}")
+    if not given:
+        raise ValueError(f"a model needs an effect: choose from {', '.join(EFFECTS)}")
+    return tuple(name for name in EFFECTS if name in given)
+
+
+def parts_of(*effects: str) -> Parts:
+    """What a model of the given effects is composed of; raises as :func:`compose`."""
+    names = in_order(effects)
+    parts = Parts()
+    for name in names:
+        parts = EFFECTS[name].add(parts, frozenset(names))
+    return parts
+
+
+@lru_cache(maxsize=None)
+def _composed(names: tuple[str, ...]) -> type[Composition]:
+    parameters: dict[str, Parameter] = {}
+    for name in names:
+        declared = {n: f.metadata["parameter"] for n, f in EFFECTS[name].parameters.items()}
+        parameters = EFFECTS[name].declare(parameters | declared)
+    cls = assemble(
+        "+".join(names),
+        parameters,
+        Composition.evaluate,
+        doc="; ".join(EFFECTS[name].meaning for name in names) + ".",
+        references=tuple(dict.fromkeys(key for name in names for key in EFFECTS[name].references)),
+        anisotropic="anisotropy" in names,
+        base=Composition,
+        parts=parts_of(*names),
+        effects=names,
+    )
+    assert issubclass(cls, Composition)
+    return cls
+
+
+__all__ = ["EFFECTS", "Effect", "compose", "in_order", "parts_of"]

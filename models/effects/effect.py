@@ -1,0 +1,39 @@
+"""What an effect is: parameters, and what it does to the parts of a model."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Mapping
+from dataclasses import dataclass
+from typing import Any
+
+from ..base import Parameter
+from ..parts import Parts
+
+Declared = dict[str, Parameter]
+
+
+def _nothing_else(parameters: Declared) -> Declared:
+    return parameters
+
+
+@dataclass(frozen=True)
+class Effect:
+    """One effect of reflection, as a change to the parts of a model that lacks it."""
+
+    name: str
+    meaning: str
+    """What it is, in a few words."""
+    formula: str
+    """What it adds or replaces, in the notation of the documentation."""
+    parameters: Mapping[str, Any]
+    """What it adds to the parameters of a model, as :func:`brdfit.parameter` declares it."""
+    add: Callable[[Parts, frozenset[str]], Parts]
+    """The parts with it, of the parts without it and the names of all effects of the model."""
+    needs: tuple[str, ...] = ()
+    """Effects it makes no sense without: of each entry, as ``"lobe"`` or ``"lobe or diffraction"``, one."""
+    declare: Callable[[Declared], Declared] = _nothing_else
+    """What it changes about the parameters, its own and those of the effects before it."""
+    references: tuple[str, ...] = ()
+
+
+__all__ = ["Declared", "Effect"]

@@ -1,0 +1,54 @@
+"""A lobe of microfacets, of one width, without Fresnel's rise and without masking but that which its divisor cancels."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+from typing import Any
+
+import jax.numpy as jnp
+from jaxtyping import Array, Float
+
+from ...geometry import Geometry
+from .. import ndf
+from ..base import NOT_NEGATIVE, POSITIVE, parameter
+from ..parts import Lobe, Parts
+from .effect import Effect
+
+
+def width(m: Any) -> Float[Array, ""]:
+    """Alpha of the lobe; where it is anisotropic, that of the round lobe that it is stretched from."""
+    alpha: Float[Array, ""] = m.alpha if hasattr(m, "alpha") else jnp.sqrt(m.alpha_x * m.alpha_y)
+    return alpha
+
+
+def _facets(m: Any) -> ndf.GGX:
+    return ndf.GGX(width(m))
+
+
+def _reflectance(m: Any, g: Geometry) -> Float[Array, "..."]:
+    specular: Float[Array, "..."] = m.specular
+    return specular
+
+
+def _add(parts: Parts, effects: frozenset[str]) -> Parts:
+    return replace(parts, lobes=(Lobe(_facets, _reflectance),))
+
+
+LOBE = Effect(
+    "lobe",
+    "a lobe of microfacets with the GGX distribution and constant reflectance",
+    "specular D/4, D = alpha^2/(pi (sin^2 theta_h + alpha^2 cos^2 theta_h)^2)",
+    {
+        "specular": parameter(
+            "reflectance of a facet at normal incidence, F0",
+            per_channel=True,
+            linear=True,
+            valid=NOT_NEGATIVE,
+            search=(0, 1),
+            default=0.04,
+        ),
+        "alpha": parameter("lobe width", valid=POSITIVE, search=(1e-9, 10), default=0.1, log=True),
+    },
+    _add,
+    references=("trowbridge1975", "walter2007", "hoffman2013"),
+)

@@ -1,0 +1,80 @@
+"""A model as the sum of its parts: a body term, lobes of microfacets, and further terms. What it lacks is not there."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from dataclasses import dataclass
+from typing import Any, ClassVar
+
+from jaxtyping import Array, Float
+
+from ..geometry import Geometry
+from .base import BRDF
+from .diffuse import lambert
+from .masking.smith import NDF
+from .microfacet import microfacet
+
+Field = Float[Array, "..."]
+Term = Callable[[Any, Geometry], Field]
+"""A quantity of the parameters of one channel and a geometry."""
+
+
+def implicit(lobe: NDF, g: Geometry) -> float:
+    """V = 1/4, of G = (n.l)(n.v): masking that its divisor cancels (Hoffman 2013, eq. 29)."""
+    return 0.25
+
+
+def _lambert(albedo: Field, m: Any, g: Geometry) -> Field:
+    return lambert(albedo)
+
+
+@dataclass(frozen=True)
+class Lobe:
+    """Microfacets of one distribution."""
+
+    facets: Callable[[Any], NDF]
+    """Their distribution, of the parameters."""
+    reflectance: Term
+    """F of one facet, with its scale."""
+
+
+@dataclass(frozen=True)
+class Parts:
+    """What a model is composed of."""
+
+    albedo: Term | None = None
+    """Albedo of the body term; None for a model without one."""
+    body: Callable[[Field, Any, Geometry], Field] = _lambert
+    """The body term, 1/sr, of that albedo, the parameters and the geometry."""
+    lobes: tuple[Lobe, ...] = ()
+    visibility: Callable[[Any, Geometry], Any] = implicit
+    """V = G / (4 n.l n.v) of a distribution."""
+    terms: tuple[Term, ...] = ()
+    """Whatever else is added, 1/sr."""
+
+    def evaluate(self, m: Any, g: Geometry) -> Field:
+        """Value in 1/sr of the parameters of one channel."""
+        values = [] if self.albedo is None else [self.body(self.albedo(m, g), m, g)]
+        for lobe in self.lobes:
+            facets = lobe.facets(m)
+            values.append(microfacet(facets(g.sin2_h, g.cos2_h), lobe.reflectance(m, g), self.visibility(facets, g)))
+        values += [term(m, g) for term in self.terms]
+        total = values[0]
+        for value in values[1:]:
+            total = total + value
+        return total
+
+
+class Composition(BRDF):
+    """A model that is the sum of its :class:`Parts`."""
+
+    parts: ClassVar[Parts]
+    effects: ClassVar[tuple[str, ...]] = ()
+    """The effects of ``brdfit.compose`` that it consists of; none for parts from elsewhere."""
+
+    def evaluate(self, g: Geometry) -> Field:
+        """Value in 1/sr."""
+        return self.parts.evaluate(self, g)
+
+
+__all__ = ["Composition", "Lobe", "Parts", "implicit"]
