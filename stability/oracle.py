@@ -2,23 +2,25 @@
 
 Equation numbers are those of Hoffman (2013), "Background: physics and math of shading", unless another paper is named.
 Every formula stands as it is printed; where it has a removable singularity or cancels, digits are added instead of
-rewriting it. Integrals use fixed nodes, so that a difference quotient sees a smooth function.
+rewriting it. Integrals are differentiated under the integral sign.
 """
 
 from __future__ import annotations
 
 from collections.abc import Callable, Sequence
-from functools import cache
+from functools import cache, lru_cache
 from typing import Any
 
 from mpmath import mp, mpf
 
 DIGITS = 40
-DIFFERENCE_DIGITS = 75  # STEP costs 30, and a lobe 1e13 times the body term 13 in the derivative of that term
-MANY_DIGITS = 130  # the normalisers lose up to 3 log10(1/b) + 2 log10(1/|c - 1|) digits: 24 + 60 at the corners tested
+STEP = mpf(10) ** -50  # of a difference quotient, which is then wrong by STEP f''/2: at most 1e-24, of a lobe of height 1e13
+DIFFERENCE_DIGITS = 105  # STEP costs 50, and a lobe 1e13 times the body term 13 in the derivative of that term
+MANY_DIGITS = 200  # the normalisers lose up to 3 log10(1/b) + 2 log10(1/|c - 1|) digits: 24 + 100 a step beside c = 1
 
 Vector = Sequence[Any]
-Density = Callable[[Any], Any]
+Density = Callable[[Any, Any, Any], Any]
+"""Of two parameters and n.m."""
 
 
 # Normal distributions: functions of n.m -------------------------------------------------------------------------------
@@ -61,7 +63,7 @@ def abc(b: Any, c: Any, cosine: Any) -> Any:
 @cache
 def upper_gamma(s: Any, x: Any) -> Any:
     """Gamma(s, x), the upper incomplete gamma function."""
-    with mp.workdps(DIGITS + 20):
+    with mp.workdps(DIFFERENCE_DIGITS):
         return mp.gammainc(s, x)
 
 
@@ -93,71 +95,138 @@ def gauss_legendre(n: int) -> tuple[tuple[Any, Any], ...]:
 
 NODES = 20
 PANEL = mpf("0.7")  # width in ln tan(theta): errs by 2e-11 at the worst, the derivative of a Gaussian whose kink is far out
+BELOW, ABOVE = 12, 24  # in ln tan(theta): e^-24 of the mass is left out on either side, 4e-11
+with mp.workdps(DIGITS):
+    NEXT_TO_NORMAL = 1 - mpf(10) ** -20  # stands for a cosine of 1, where the sine divides
+
+Nodes = Sequence[tuple[Any, Any, Any]]
 
 
-def integrate(f: Callable[[Any], Any], a: Any, b: Any) -> Any:
-    """Integral of a smooth ``f`` over [a, b] by one Gauss-Legendre panel."""
-    return (b - a) * mp.fsum(w * f(a + (b - a) * x) for x, w in gauss_legendre(NODES))
+def nodes(start: Any, width: Any, squared: bool = False) -> Nodes:
+    """cos(theta_m), sin(theta_m) and the weights of int sin(theta_m) dtheta_m for a panel of ln tan(theta_m).
 
-
-def projected_area(density: Density, cosine: Any, low: Any, high: Any) -> Any:
-    """Integral of max(0, v.m) D(m) over the hemisphere of m, with the azimuth in closed form.
-
-    The rest is summed over panels of ln tan(theta_m) from ``low`` to ``high``, the range that ``density`` needs; the
-    integrand has a kink of order 3/2 at theta_m + theta_v = 90 degrees, where panels meet and a square root is mapped out.
+    With ``squared`` they go from ``start`` as the square of an even variable, in which the root of a kink is smooth.
     """
-    sine = mp.sqrt(1 - cosine**2)
-    kink = mp.log(cosine / sine)
-
-    def integrand(x: Any) -> Any:
-        tangent = mp.exp(x)
+    found = []
+    for x, w in gauss_legendre(NODES):
+        tangent = mp.exp(start + width * (x * x if squared else x))
         c = 1 / mp.sqrt(1 + tangent**2)
         s = tangent * c
-        if x <= kink:
-            azimuth = 2 * mp.pi * cosine * c
-        else:
-            phi0 = mp.acos(-cosine / sine * c / s)
-            azimuth = 2 * (phi0 * cosine * c + sine * s * mp.sin(phi0))
-        return density(c) * azimuth * s * (s * c)  # dtheta = sin cos dx
-
-    def panels(a: Any, b: Any) -> Any:
-        count = max(1, int(mp.ceil((b - a) / PANEL)))
-        width = (b - a) / count
-        return mp.fsum(integrate(integrand, a + k * width, a + (k + 1) * width) for k in range(count))
-
-    if kink >= high:
-        return panels(low, high)
-    width = min(PANEL, high - kink)
-    after = integrate(lambda r: integrand(kink + width * r * r) * 2 * width * r, mpf(0), mpf(1))
-    if width == PANEL:
-        after += panels(kink + width, high)
-    return after + (panels(low, kink) if low < kink else 0)
-
-
-BELOW, ABOVE = 12, 24  # in ln tan(theta): e^-24 of the mass is left out on either side, 4e-11
+        found.append((c, s, width * w * (2 * x if squared else 1) * s * s * c))  # dtheta = sin cos dx
+    return found
 
 
 @cache
-def gtr_masking(alpha: Any, gamma: Any, cosine: Any) -> Any:
-    """G1, the exact Smith masking of :func:`gtr`."""
-    if cosine == 1:
-        return mpf(1)
+def panel(k: int) -> Nodes:
+    """The nodes of panel ``k``, which all parameters and polar angles share."""
+    return nodes(k * PANEL, PANEL)
+
+
+def parted(cosine: Any, at: Nodes) -> tuple[Any, Any]:
+    """Weights times the integral of max(0, v.m) over the azimuth, some m averted, and its derivative by ``cosine`` = n.v.
+
+    phi0 need not be moved in the derivative: the integrand is 0 there.
+    """
+    sine = mp.sqrt(1 - cosine**2)
+    area, slope = [], []
+    for c, s, w in at:
+        phi0 = mp.acos(-cosine / sine * c / s)
+        area.append(2 * w * (phi0 * cosine * c + sine * s * mp.sin(phi0)))
+        slope.append(2 * w * (phi0 * c - cosine / sine * s * mp.sin(phi0)))
+    return area, slope
+
+
+@cache
+def parted_panel(cosine: Any, k: int) -> tuple[Any, Any]:
+    """:func:`parted` for panel ``k``."""
+    return parted(cosine, panel(k))
+
+
+def density_and_slopes(density: Density, p: Any, q: Any, at: Nodes) -> list[list[Any]]:
+    """D at nodes, and its derivatives by its two parameters as difference quotients."""
+    here = [density(p, q, c) for c, *_ in at]
+    steps = [STEP * (abs(x) or 1) for x in (p, q)]
+    by_p = [(density(p + steps[0], q, c) - d) / steps[0] for (c, *_), d in zip(at, here, strict=True)]
+    by_q = [(density(p, q + steps[1], c) - d) / steps[1] for (c, *_), d in zip(at, here, strict=True)]
+    return [here, by_p, by_q]
+
+
+@lru_cache(maxsize=512)  # the panels of some sets of parameters: polar angles share them
+def density_panel(density: Density, p: Any, q: Any, k: int) -> list[list[Any]]:
+    """:func:`density_and_slopes` for panel ``k``."""
+    return density_and_slopes(density, p, q, panel(k))
+
+
+def projection(at: Nodes, values: list[list[Any]]) -> list[Any]:
+    """Integrals of (n.m) D and of its derivatives: where no m is averted, the projected area over n.v."""
+    weights = [2 * mp.pi * c * w for c, _, w in at]
+    return [mp.fdot(weights, v) for v in values]
+
+
+@lru_cache(maxsize=512)
+def projection_panel(density: Density, p: Any, q: Any, k: int) -> list[Any]:
+    """:func:`projection` for panel ``k``."""
+    return projection(panel(k), density_panel(density, p, q, k))
+
+
+@cache
+def projected_area(density: Density, p: Any, q: Any, cosine: Any) -> list[Any]:
+    """Integral of max(0, v.m) D(m) over the hemisphere of m, and its derivatives by ``p``, ``q`` and ``cosine`` = n.v < 1.
+
+    The azimuth is in closed form, the rest is summed over panels of ln tan(theta_m). The integrand has a kink of order 3/2
+    at theta_m + theta_v = 90 degrees, from which panels go out anew. Derivatives are those of the integrand at its nodes.
+    """
+    with mp.workdps(DIFFERENCE_DIGITS):
+        kink = mp.log(cosine / mp.sqrt(1 - cosine**2))
+        first, here, last = (int(mp.floor(x / PANEL)) for x in EXTENT[density](p, q, kink))
+        facing = [projection_panel(density, p, q, k) for k in range(first, min(here, last + 1))]
+        averted = [(density_panel(density, p, q, k), parted_panel(cosine, k)) for k in range(max(first, here + 2), last + 1)]
+        if first - 2 < here <= last:
+            before = nodes(here * PANEL, kink - here * PANEL)
+            facing.append(projection(before, density_and_slopes(density, p, q, before)))
+            half = ((here + 2) * PANEL - kink) / 2
+            for after in (nodes(kink, half, squared=True), nodes(kink + half, half)):
+                averted.append((density_and_slopes(density, p, q, after), parted(cosine, after)))
+        mass = [mp.fsum(column) for column in zip(*facing, strict=True)] or [mpf(0)] * 3
+        area = [cosine * m + mp.fsum(mp.fdot(d[n], w) for d, (w, _) in averted) for n, m in enumerate(mass)]
+        return [*area, mass[0] + mp.fsum(mp.fdot(d[0], slope) for d, (_, slope) in averted)]
+
+
+def gtr_extent(alpha: Any, gamma: Any, kink: Any) -> tuple[Any, Any, Any]:
+    """Ends of the integral of :func:`gtr` in ln tan(theta_m), with the kink between them."""
     narrow = mp.log(min(1, alpha / mp.sqrt(1 + gamma)))
     wide = mp.log(max(1, alpha * mp.sqrt(1 + gamma)))  # for alpha > 1 the density sits on the horizon
-    density = lambda c: gtr(alpha, gamma, c)  # noqa: E731
-    level = mp.log(cosine / mp.sqrt(1 - cosine**2))  # towards normal incidence the integrand ends beyond the kink
-    return cosine / projected_area(density, cosine, narrow - BELOW, max(wide, level) + ABOVE)
+    return narrow - BELOW, kink, max(wide, kink) + ABOVE  # towards normal incidence the integrand ends beyond the kink
 
 
-@cache
+def sgd_extent(alpha: Any, p: Any, kink: Any) -> tuple[Any, Any, Any]:
+    """The same of :func:`sgd`."""
+    return mp.log(alpha / mp.sqrt(alpha + abs(p) + 1)) - BELOW, kink, mp.log(alpha * 200) / 2  # e^-200 is left out
+
+
+EXTENT: dict[Density, Callable[..., tuple[Any, Any, Any]]] = {gtr: gtr_extent, sgd: sgd_extent}
+
+
+def masking(density: Density, p: Any, q: Any, cosine: Any) -> Any:
+    """G1, the exact Smith masking of a density, n.v over the projected area.
+
+    The area is that at the float64 numbers nearest to the arguments, carried from there to the first order: what a
+    difference quotient needs of steps that float64 does not see, without an integral for each.
+    """
+    at = [mpf(float(x)) for x in (p, q, cosine)]
+    at[2] = min(at[2], NEXT_TO_NORMAL)
+    area, *slopes = projected_area(density, *at)
+    return cosine / (area + mp.fsum(d * (x - x0) for d, x, x0 in zip(slopes, (p, q, cosine), at, strict=True)))
+
+
+def gtr_masking(alpha: Any, gamma: Any, cosine: Any) -> Any:
+    """G1 of :func:`gtr`."""
+    return masking(gtr, alpha, gamma, cosine)
+
+
 def sgd_masking(alpha: Any, p: Any, cosine: Any) -> Any:
-    """G1, the exact Smith masking of :func:`sgd`."""
-    if cosine == 1:
-        return mpf(1)
-    narrow = mp.log(alpha / mp.sqrt(alpha + abs(p) + 1))
-    wide = mp.log(alpha * 200) / 2  # e^-200 is left out
-    density = lambda c: sgd(alpha, p, c)  # noqa: E731
-    return cosine / projected_area(density, cosine, narrow - BELOW, wide)
+    """G1 of :func:`sgd`."""
+    return masking(sgd, alpha, p, cosine)
 
 
 # Models: one channel, directions as triples ---------------------------------------------------------------------------
@@ -270,38 +339,3 @@ MODELS: dict[str, Callable[..., Any]] = {
     "AshikhminShirleyAnisotropic": ashikhmin_shirley_model,
 }
 """By the name of the class under test."""
-
-
-def value(name: str, parameters: dict[str, float], wi: Sequence[float], wo: Sequence[float]) -> Any:
-    """The model's value for parameters and directions taken as exact."""
-    with mp.workdps(DIGITS):
-        numbers = {k: mpf(float(x)) for k, x in parameters.items()}
-        return MODELS[name]([mpf(float(x)) for x in wi], [mpf(float(x)) for x in wo], **numbers)
-
-
-STEP = mpf(10) ** -30  # of a difference quotient, which is then wrong by STEP^2 f'''/6
-
-
-def gradient(name: str, parameters: dict[str, float], wi: Sequence[float], wo: Sequence[float]) -> dict[str, Any]:
-    """Derivatives by parameter, and in every component of the directions, ``wi_0`` to ``wo_2``.
-
-    Components are independent: the formulas are those of MODELS.md off the unit sphere too.
-    """
-    model, out = MODELS[name], {}
-    with mp.workdps(DIFFERENCE_DIGITS):
-        numbers = {k: mpf(float(x)) for k, x in parameters.items()}
-        ends = {"wi": [mpf(float(x)) for x in wi], "wo": [mpf(float(x)) for x in wo]}
-        for key, x in numbers.items():
-            step = STEP * (abs(x) or 1)
-            high, low = (model(ends["wi"], ends["wo"], **{**numbers, key: x + s}) for s in (step, -step))
-            out[key] = (high - low) / (2 * step)
-        for end, vector in ends.items():
-            for axis in range(3):
-                # a cosine stays below 1, where the sine of masking is real: the derivative there is taken 1e-20 away
-                centre = min(vector[axis], 1 - mpf(10) ** -20)
-                moved = []
-                for s in (STEP, -STEP):
-                    vectors = {**ends, end: [centre + s if k == axis else x for k, x in enumerate(vector)]}
-                    moved.append(model(vectors["wi"], vectors["wo"], **numbers))
-                out[f"{end}_{axis}"] = (moved[0] - moved[1]) / (2 * STEP)
-    return out

@@ -55,7 +55,7 @@ REFERENCES: dict[str, dict[str, Callable[..., Any]]] = {
 
 
 def value_and_slopes(group: str, name: str, point: Sequence[float], cosines: Sequence[int]) -> tuple[float, list[float]]:
-    """The value at a point taken as exact, and its derivative by every argument as a central difference.
+    """The value at a point taken as exact, and its derivative by every argument as a difference quotient.
 
     ``cosines`` are the positions of cosines and components of directions, whose steps are relative to 1. A derivative in a
     cosine of 1 is taken next to it, where the sine of masking is real.
@@ -63,14 +63,14 @@ def value_and_slopes(group: str, name: str, point: Sequence[float], cosines: Seq
     f = REFERENCES[group][name]
     with mp.workdps(oracle.DIFFERENCE_DIGITS):
         exact = [mpf(float(x)) for x in point]
-        below_one = 1 - mpf(10) ** -12  # nearer, what the integral leaves out at its ends counts as 1/sine
+        value = f(*exact)
         slopes = []
         for k, x in enumerate(exact):
-            centre = min(x, below_one) if k in cosines else x
+            start = min(x, oracle.NEXT_TO_NORMAL) if k in cosines else x
             step = oracle.STEP * (1 if k in cosines else abs(x) or 1)
-            high, low = (f(*exact[:k], centre + s, *exact[k + 1 :]) for s in (step, -step))
-            slopes.append(float((high - low) / (2 * step)))
-        return float(f(*exact)), slopes
+            before, after = (f(*exact[:k], y, *exact[k + 1 :]) if y != x else value for y in (start, start + step))
+            slopes.append(float((after - before) / step))
+        return float(value), slopes
 
 
 def tabulate(group: str, name: str, points: Reals, cosines: Sequence[int]) -> tuple[Reals, Reals]:

@@ -12,7 +12,7 @@ from typing import Any
 
 import numpy as np
 from brdfit.models import BRDF, MODELS, fresnel, masking, ndf, parameters_of
-from brdfit.stability import oracle
+from brdfit.stability import reference
 from brdfit.stability.domain import GRAZING, NEAR, unit
 from numpy.typing import NDArray
 
@@ -63,9 +63,6 @@ WI, WO = directions()
 FEW = np.r_[0:4, 12:19, 20, 23, 25, 26, 29, 33, 35, 39, len(WI) - 5 : len(WI)]
 """A selection of directions for the models whose oracle is an integral."""
 
-KINK = np.abs(WI[:, 2] - WO[:, 2]) < 1e-6
-"""Where min(n.l, n.v) or max(n.l, n.v) has no derivative in the directions."""
-
 
 # Models ---------------------------------------------------------------------------------------------------------------
 
@@ -81,6 +78,7 @@ class Row:
     few: bool = False
     """Whether the oracle is slow: the selection ``FEW`` of directions then stands for all."""
     kinked: bool = False
+    """Whether it has no derivative in the directions where n.l = n.v."""
 
     @property
     def name(self) -> str:
@@ -88,13 +86,6 @@ class Row:
 
     def directions(self) -> tuple[Reals, Reals]:
         return (WI[FEW], WO[FEW]) if self.few else (WI, WO)
-
-    def gradient_pairs(self) -> tuple[Any, Any]:
-        """Indices of the pairs of case and direction whose derivatives have an oracle."""
-        case = np.arange(len(self.cases))
-        if self.few:
-            return case, FEW[[1, 14, -4]][case % 3]
-        return np.repeat(case, len(WI)), np.tile(np.arange(len(WI)), len(case))
 
     def stacked(self, dtype: Any = np.float64) -> BRDF:
         """All cases as one instance with a leading axis of cases, and one channel."""
@@ -240,20 +231,17 @@ TABLE: tuple[Row, ...] = tuple(
 
 
 @cache
-def expected_values(name: str) -> Reals:
-    """Oracle values ``[cases, directions]`` of a row, as float64."""
+def expected(name: str) -> tuple[Reals, dict[str, Reals]]:
+    """Oracle values of a row, ``[cases, directions]``, and derivatives by parameter and by component, ``wi_0`` to ``wo_2``."""
     row = next(r for r in TABLE if r.name == name)
     wi, wo = row.directions()
-    return np.array([[float(oracle.value(name, dict(c), a, b)) for a, b in zip(wi, wo, strict=True)] for c in row.cases])
-
-
-@cache
-def expected_slopes(name: str) -> dict[str, Reals]:
-    """Oracle derivatives of a row at its ``gradient_pairs``, by parameter and component, as float64."""
-    row = next(r for r in TABLE if r.name == name)
-    pairs = zip(*row.gradient_pairs(), strict=True)
-    found = [oracle.gradient(name, dict(row.cases[c]), WI[d], WO[d]) for c, d in pairs]
-    return {key: np.array([float(g[key]) for g in found]) for key in found[0]}
+    names = [p.name for p in parameters_of(row.model)]
+    arguments = [*names, *(f"{end}_{k}" for end in ("wi", "wo") for k in range(3))]
+    points = np.array([[*(c[n] for n in names), *l, *v] for c in row.cases for l, v in zip(wi, wo, strict=True)])  # noqa: E741
+    cosines = range(len(names), len(arguments))
+    value, slope = reference.tabulate("models", name, points, cosines)
+    shape = len(row.cases), len(wi)
+    return value.reshape(shape), {key: s.reshape(shape) for key, s in zip(arguments, slope.T, strict=True)}
 
 
 # Distributions and shared parts ---------------------------------------------------------------------------------------
