@@ -108,6 +108,15 @@ class Geometry(eqx.Module):
         across = 2 * jnp.sqrt(self.sin2_h * self.sin2_d)
         return jnp.arctan2(jnp.sqrt(jnp.maximum(across**2 - (self.cos_o - self.cos_i) ** 2, 0)), self.cos_o - self.cos_i)
 
+    @property
+    def tangential_product(self) -> Field:
+        """l_x v_x + l_y v_y = sin(theta_i) sin(theta_o) cos(phi_i - phi_o).
+
+        l.v - (n.l)(n.v), of which this is a rewriting, cancels at normal incidence; so do the terms here, but as squares
+        of sines.
+        """
+        return self.cos_d**2 * self.sin2_h - self.sin2_d + (self.cos_i - self.cos_o) ** 2 / 4
+
     def at_polar(self, function: Callable[[Field], Field]) -> tuple[Field, Field]:
         """``function(cos(theta))`` at theta_i and theta_o: through the table of polar angles where there is one."""
         if self.stencil_i is None or self.stencil_o is None:

@@ -69,12 +69,39 @@ def modified_blinn_phong(l: Vector, v: Vector, diffuse: Any, specular: Any, expo
     return diffuse / mp.pi + specular * _half(l, v)[2] ** exponent / integral
 
 
+def _polar(l: Vector, v: Vector) -> tuple[Any, Any, Any]:
+    """The larger polar angle, the smaller, and cos(phi_i - phi_o)."""
+    i, o = (mp.atan2(mp.hypot(x[0], x[1]), x[2]) for x in (l, v))
+    return max(i, o), min(i, o), mp.cos(mp.atan2(l[1], l[0]) - mp.atan2(v[1], v[0]))
+
+
+def oren_nayar(l: Vector, v: Vector, diffuse: Any, sigma: Any) -> Any:
+    """Oren & Nayar (1994), eq. 30."""
+    alpha, beta, c = _polar(l, v)
+    a = 1 - sigma**2 / (sigma**2 + mpf("0.33")) / 2
+    b = mpf("0.45") * sigma**2 / (sigma**2 + mpf("0.09"))
+    return diffuse / mp.pi * (a + b * max(0, c) * mp.sin(alpha) * mp.tan(beta))
+
+
+def oren_nayar_full(l: Vector, v: Vector, diffuse: Any, sigma: Any) -> Any:
+    """Oren & Nayar (1994), eq. 27 to 29."""
+    alpha, beta, c = _polar(l, v)
+    s = sigma**2
+    c1 = 1 - s / (s + mpf("0.33")) / 2
+    c2 = mpf("0.45") * s / (s + mpf("0.09")) * (mp.sin(alpha) - (0 if c >= 0 else (2 * beta / mp.pi) ** 3))
+    c3 = mpf("0.125") * s / (s + mpf("0.09")) * (4 * alpha * beta / mp.pi**2) ** 2
+    once = diffuse / mp.pi * (c1 + c * c2 * mp.tan(beta) + (1 - abs(c)) * c3 * mp.tan((alpha + beta) / 2))
+    return once + mpf("0.17") * diffuse**2 / mp.pi * s / (s + mpf("0.13")) * (1 - c * (2 * beta / mp.pi) ** 2)
+
+
 MODELS: dict[str, Callable[..., Any]] = {
     "Phong": phong,
     "ModifiedPhong": modified_phong,
     "MaxPhong": max_phong,
     "BlinnPhong": blinn_phong,
     "ModifiedBlinnPhong": modified_blinn_phong,
+    "OrenNayar": oren_nayar,
+    "OrenNayarFull": oren_nayar_full,
 }
 """By the name of the class under test: functions of unit vectors and parameters."""
 

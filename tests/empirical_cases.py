@@ -75,6 +75,10 @@ FULL = [{"diffuse": 0.0, "specular": 1.0, "exponent": e} for e in (0.0, 1.0, 4.0
 LEVEL = np.abs(WI[:, 2] - WO[:, 2]) < 1e-6
 ENDING = np.abs(2 * WI[:, 2] * WO[:, 2] - (WI * WO).sum(-1)) < 0.01
 """Where r.v is nearly 0."""
+CREASE = LEVEL | (np.abs((WI * WO)[:, :2].sum(-1)) < 1e-9)
+"""Where in addition l and v lie at right angles about the normal, or along it."""
+ROUGH = {"diffuse": 0.5, "sigma": 0.4}
+ROUGHER = [{"sigma": s} for s in (0.0, 1e-2, 1.0, 3.0)] + [{"diffuse": 0.0}, {"diffuse": 1.0}]
 
 EMPIRICAL: tuple[Row, ...] = (
     row("phong", LOBE, *EXPONENTS, reciprocal=False, faint=ENDING, truth={"exponent": 40.0}),
@@ -82,4 +86,6 @@ EMPIRICAL: tuple[Row, ...] = (
     row("max_phong", LOBE, *EXPONENTS, kink=LEVEL, energy=FULL, faint=ENDING, truth={"exponent": 40.0}),
     row("blinn_phong", LOBE, *EXPONENTS, {"exponent": 0.0}, truth={"exponent": 80.0}),
     row("modified_blinn_phong", LOBE, *EXPONENTS, {"exponent": 0.0}, energy=FULL, truth={"exponent": 80.0}),
+    row("oren_nayar", ROUGH, *ROUGHER, kink=CREASE, energy=[{"diffuse": 0.984, "sigma": s} for s in (0.1, 0.2, 0.5, 3.0)]),
+    row("oren_nayar_full", ROUGH, *ROUGHER, kink=CREASE),
 )

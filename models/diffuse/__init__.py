@@ -2,3 +2,5 @@
 
 from .ashikhmin_shirley import ashikhmin_shirley_body as ashikhmin_shirley_body
 from .lambert import lambert as lambert
+from .oren_nayar import oren_nayar as oren_nayar
+from .oren_nayar import oren_nayar_full as oren_nayar_full
