@@ -185,8 +185,8 @@ def projected_area(density: Density, p: Any, q: Any, cosine: Any) -> list[Any]:
             before = nodes(here * PANEL, kink - here * PANEL)
             facing.append(projection(before, density_and_slopes(density, p, q, before)))
             half = ((here + 2) * PANEL - kink) / 2
-            for after in (nodes(kink, half, squared=True), nodes(kink + half, half)):
-                averted.append((density_and_slopes(density, p, q, after), parted(cosine, after)))
+            after = nodes(kink, half, squared=True), nodes(kink + half, half)
+            averted += [(density_and_slopes(density, p, q, at), parted(cosine, at)) for at in after]
         mass = [mp.fsum(column) for column in zip(*facing, strict=True)] or [mpf(0)] * 3
         area = [cosine * m + mp.fsum(mp.fdot(d[n], w) for d, (w, _) in averted) for n, m in enumerate(mass)]
         return [*area, mass[0] + mp.fsum(mp.fdot(d[0], slope) for d, (_, slope) in averted)]

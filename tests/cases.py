@@ -232,7 +232,7 @@ TABLE: tuple[Row, ...] = tuple(
 
 @cache
 def expected(name: str) -> tuple[Reals, dict[str, Reals]]:
-    """Oracle values of a row, ``[cases, directions]``, and derivatives by parameter and by component, ``wi_0`` to ``wo_2``."""
+    """Oracle values of a row, ``[cases, directions]``, and derivatives by parameter and component, ``wi_0`` to ``wo_2``."""
     row = next(r for r in TABLE if r.name == name)
     wi, wo = row.directions()
     names = [p.name for p in parameters_of(row.model)]
