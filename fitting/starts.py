@@ -7,20 +7,14 @@ the linear coordinates alone, and the best shapes are polished together with the
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterator
+from collections.abc import Iterator
 from dataclasses import dataclass
-from itertools import product
 
 import numpy as np
 from numpy.typing import NDArray
 
 from ..angles import half_difference
 from ..models import BRDF, parameters_of
-from ..models.abc import ABC
-from ..models.ashikhmin_shirley import AshikhminShirley, AshikhminShirleyAnisotropic
-from ..models.gtr import GTR
-from ..models.sgd import SGD
-from ..models.ward import Ward, WardAnisotropic
 from ..tables import HalfDifferenceGrid, Table
 
 Shape = dict[str, float]
@@ -70,67 +64,6 @@ def summarise(table: Table, used: NDArray[np.bool_]) -> Summary:
     return Summary(float(np.clip(t, 1e-3, 1.2)), body)
 
 
-def _gtr(t: float) -> Iterator[Shape]:
-    s2 = np.sin(t) ** 2
-    for gamma, scale in product((1.1, 2.0, 4.0), (0.3, 1.0, 3.0)):
-        kappa = np.expm1(np.log(2) / gamma) / (s2 * scale**2)
-        yield {"alpha": (1 + kappa) ** -0.5, "gamma": gamma}
-    # the pure power law, its gentler neighbours, the Gaussian limit, and lobes that grow towards grazing
-    yield from ({"alpha": a, "gamma": g} for a, g in ((1e-6, 1.03), (1e-6, 1.15), (1e-4, 1.15), (3e-3, 1.4)))
-    for scale in (0.5, 1.0, 2.0):
-        gamma = 300.0
-        yield {"alpha": float(np.exp(-np.log(2) / (s2 * scale**2) / gamma / 2)), "gamma": gamma}
-    yield from ({"alpha": a, "gamma": g} for a, g in ((1.3, 2.0), (2.0, 1.0), (1.05, 20.0)))
-
-
-def _abc(t: float) -> Iterator[Shape]:
-    for c, ior, scale in product((0.4, 0.7, 1.0, 1.6, 4.0), (1.3, 1.7, 6.0, 60.0), (1.0, 0.2)):
-        b = np.expm1(np.log(2) / c) / ((1 - np.cos(t)) * scale)
-        yield {"b": float(b), "c": c, "ior": ior}
-    yield from ({"b": 1 / (1 - np.cos(t)), "c": 20.0, "ior": ior} for ior in (1.5, 60.0))
-
-
-def _sgd(t: float) -> Iterator[Shape]:
-    tan2 = np.tan(t) ** 2
-    for p, scale in product((-1.0, 0.0, 0.5, 1.0, 1.5, 3.0), (0.1, 1.0, 4.0)):
-        grid = np.exp(np.linspace(np.log(1e-7), np.log(30), 2000))
-        fall = tan2 * scale / grid + p * np.log1p(tan2 * scale / grid**2)
-        yield {"alpha": float(grid[np.argmin(np.abs(fall - np.log(2)))]), "p": p}
-    yield from ({"alpha": a, "p": p} for a, p in ((1e-4, 1.2), (1e-3, 1.0), (0.3, 8.0), (2.0, 20.0)))
-
-
-def _ward(t: float) -> Iterator[Shape]:
-    for scale in (0.3, 0.6, 1.0, 2.0, 5.0, 15.0):
-        yield {"alpha": float(np.clip(np.tan(t) / np.sqrt(np.log(2)) * scale, 2e-4, 20))}
-
-
-def _ashikhmin_shirley(t: float) -> Iterator[Shape]:
-    exponent = -np.log(2) / np.log(np.cos(t))
-    for scale in (0.1, 0.3, 1.0, 3.0, 10.0):
-        yield {"exponent": float(np.clip(exponent * scale, 2e-3, 5e6))}
-    yield from ({"exponent": e} for e in (0.05, 1.0, 5.0))
-
-
-def _pairs(shapes: Callable[[float], Iterator[Shape]], name: str) -> Callable[[float], Iterator[Shape]]:
-    """Elliptical shapes from round ones: each stretched either way."""
-
-    def pairs(t: float) -> Iterator[Shape]:
-        for shape, stretch in product(shapes(t), (0.4, 1.0, 2.5)):
-            yield {f"{name}_x": shape[name] * stretch, f"{name}_y": shape[name] / stretch}
-
-    return pairs
-
-
-_SHAPES: dict[type[BRDF], Callable[[float], Iterator[Shape]]] = {
-    GTR: _gtr,
-    ABC: _abc,
-    SGD: _sgd,
-    Ward: _ward,
-    WardAnisotropic: _pairs(_ward, "alpha"),
-    AshikhminShirley: _ashikhmin_shirley,
-    AshikhminShirleyAnisotropic: _pairs(_ashikhmin_shirley, "exponent"),
-}
-
 GENERIC = 24
 """Starts of a model that has no shapes of its own: its defaults and points spread over its search box."""
 
@@ -156,9 +89,9 @@ def _generic(cls: type[BRDF], seed: int) -> Iterator[Shape]:
 
 def starts(cls: type[BRDF], summary: Summary, seed: int) -> Iterator[dict[str, NDArray[np.float64]]]:
     """Full parameter sets to start from, arrays ``[]`` or ``[C]``."""
-    shapes = _SHAPES[cls](summary.half_width) if cls in _SHAPES else _generic(cls, seed)
+    shapes = cls.shapes(summary.half_width)
     channels = len(summary.body)
-    for shape in shapes:
+    for shape in _generic(cls, seed) if shapes is None else shapes:
         values = {}
         for p in parameters_of(cls):
             value: NDArray[np.float64] = np.asarray(shape.get(p.name, p.default), float)

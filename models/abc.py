@@ -2,8 +2,10 @@
 
 from __future__ import annotations
 
+from itertools import product
 from typing import ClassVar
 
+import numpy as np
 from jaxtyping import Array, Float
 
 from ..geometry import Geometry
@@ -35,6 +37,15 @@ class ABC(BRDF):
     b: Float[Array, ""] = parameter("inverse width of the lobe", valid=POSITIVE, search=(1e-2, 1e9), default=100, log=True)
     c: Float[Array, ""] = parameter("fall-off of the tail", valid=NOT_NEGATIVE, search=(1e-3, 1e4), default=1, log=True)
     ior: Float[Array, ""] = parameter("index of refraction", valid=Interval(1), search=(1.001, 1001), default=1.5, log=True)
+
+    @classmethod
+    def shapes(cls, half_width: float) -> list[dict[str, float]]:
+        """Tails and indices crossed, the width as each tail has it."""
+        vers = 1 - np.cos(half_width)
+        shapes = []
+        for c, ior, scale in product((0.4, 0.7, 1.0, 1.6, 4.0), (1.3, 1.7, 6.0, 60.0), (1.0, 0.2)):
+            shapes.append({"b": float(np.expm1(np.log(2) / c) / (vers * scale)), "c": c, "ior": ior})
+        return shapes + [{"b": float(1 / vers), "c": 20.0, "ior": ior} for ior in (1.5, 60.0)]
 
     def evaluate(self, g: Geometry) -> Float[Array, "..."]:
         """Value in 1/sr."""

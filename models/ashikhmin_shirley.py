@@ -5,12 +5,13 @@ from __future__ import annotations
 from typing import Any, ClassVar
 
 import jax.numpy as jnp
+import numpy as np
 from jaxtyping import Array, Float
 
 from ..geometry import Geometry
 from . import ndf
 from .base import BRDF, NOT_NEGATIVE, Interval, parameter
-from .common import diffuse_parameter
+from .common import diffuse_parameter, stretched_shapes
 from .diffuse import ashikhmin_shirley_body
 from .fresnel import schlick
 
@@ -45,6 +46,13 @@ class AshikhminShirley(BRDF):
     specular: Float[Array, " C"] = _specular()
     exponent: Float[Array, ""] = _exponent("Phong exponent of the lobe")
 
+    @classmethod
+    def shapes(cls, half_width: float) -> list[dict[str, float]]:
+        """Narrower and wider than the lobe is, and lobes that serve as body."""
+        exponent = -np.log(2) / np.log(np.cos(half_width))
+        shapes = [{"exponent": float(np.clip(exponent * k, 2e-3, 5e6))} for k in (0.1, 0.3, 1.0, 3.0, 10.0)]
+        return shapes + [{"exponent": e} for e in (0.05, 1.0, 5.0)]
+
     def evaluate(self, g: Geometry) -> Float[Array, "..."]:
         """Value in 1/sr."""
         d = ndf.power_cosine(g.sin2_h, g.cos2_h, self.exponent)
@@ -65,6 +73,11 @@ class AshikhminShirleyAnisotropic(BRDF):
     specular: Float[Array, " C"] = _specular()
     exponent_x: Float[Array, ""] = _exponent("Phong exponent along the tangent")
     exponent_y: Float[Array, ""] = _exponent("Phong exponent along the bitangent")
+
+    @classmethod
+    def shapes(cls, half_width: float) -> list[dict[str, float]]:
+        """Those of the round lobe, stretched."""
+        return stretched_shapes(AshikhminShirley.shapes(half_width), "exponent")
 
     def evaluate(self, g: Geometry) -> Float[Array, "..."]:
         """Value in 1/sr."""

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import abc
 import math
-from collections.abc import Callable
+from collections.abc import Callable, Iterable
 from dataclasses import dataclass, fields, replace
 from typing import Any, ClassVar
 
@@ -102,6 +102,13 @@ class BRDF(eqx.Module):
     """Keys of ``brdfit.references`` for what the model is made of."""
     anisotropic: ClassVar[bool] = False
     """Whether the value depends on the azimuth of the half vector."""
+
+    @classmethod
+    def shapes(cls, half_width: float) -> Iterable[dict[str, float]] | None:
+        """Where fits start: values of the parameters that bend the lobe, for a lobe of this half-width in radians (where
+        the mean over theta_d between 1 and 30 degrees has fallen half way). None: points spread over the search box.
+        """
+        return None
 
     @abc.abstractmethod
     def evaluate(self, g: Geometry) -> Float[Array, "..."]:

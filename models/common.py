@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Iterable
 from typing import Any
 
 from .base import NOT_NEGATIVE, parameter
@@ -20,3 +21,13 @@ def lobe_parameter() -> Any:
 def exponent_parameter(meaning: str = "exponent of the cosine") -> Any:
     """Exponent of a power of a cosine."""
     return parameter(meaning, valid=NOT_NEGATIVE, search=(1e-2, 1e7), default=50, log=True)
+
+
+def stretched_shapes(shapes: Iterable[dict[str, float]], name: str) -> list[dict[str, float]]:
+    """Elliptical shapes from round ones: their parameter ``name`` as a pair, each stretched either way."""
+    stretches = (0.4, 1.0, 2.5)
+    return [
+        {k: v for k, v in s.items() if k != name} | {f"{name}_x": s[name] * r, f"{name}_y": s[name] / r}
+        for s in shapes
+        for r in stretches
+    ]

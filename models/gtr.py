@@ -36,6 +36,11 @@ class GTR(BRDF):
         "fall-off of the tail (2: GGX, 1: Berry)", valid=POSITIVE, search=(0.01, 1e7), default=2, log=True
     )
 
+    @classmethod
+    def shapes(cls, half_width: float) -> list[dict[str, float]]:
+        """Those of the lobe."""
+        return ndf.GTR.shapes(half_width)
+
     def evaluate(self, g: Geometry) -> Float[Array, "..."]:
         """Value in 1/sr."""
         lobe = ndf.GTR(self.alpha, self.gamma)

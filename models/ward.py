@@ -5,20 +5,21 @@ from __future__ import annotations
 from typing import Any, ClassVar
 
 import jax.numpy as jnp
+import numpy as np
 from jaxtyping import Array, Float
 
 from ..geometry import Geometry
 from . import ndf
 from .base import BRDF, NOT_NEGATIVE, POSITIVE, parameter
-from .common import diffuse_parameter
+from .common import diffuse_parameter, stretched_shapes
 from .diffuse import lambert
 
 
-def _width(meaning: str) -> Any:
+def width_parameter(meaning: str) -> Any:
     return parameter(meaning, valid=POSITIVE, search=(1e-4, 30), default=0.15, log=True)
 
 
-def _specular() -> Any:
+def specular_parameter() -> Any:
     return parameter("scale of the lobe", per_channel=True, linear=True, valid=NOT_NEGATIVE, default=0.2)
 
 
@@ -33,8 +34,14 @@ class Ward(BRDF):
     references: ClassVar[tuple[str, ...]] = ("ward1992",)
 
     diffuse: Float[Array, " C"] = diffuse_parameter()
-    specular: Float[Array, " C"] = _specular()
-    alpha: Float[Array, ""] = _width("lobe width (rms slope times sqrt 2)")
+    specular: Float[Array, " C"] = specular_parameter()
+    alpha: Float[Array, ""] = width_parameter("lobe width (rms slope times sqrt 2)")
+
+    @classmethod
+    def shapes(cls, half_width: float) -> list[dict[str, float]]:
+        """Narrower and wider than the lobe is."""
+        alpha = np.tan(half_width) / np.sqrt(np.log(2))
+        return [{"alpha": float(np.clip(alpha * k, 2e-4, 20))} for k in (0.3, 0.6, 1.0, 2.0, 5.0, 15.0)]
 
     def evaluate(self, g: Geometry) -> Float[Array, "..."]:
         """Value in 1/sr."""
@@ -52,9 +59,14 @@ class WardAnisotropic(BRDF):
     anisotropic: ClassVar[bool] = True
 
     diffuse: Float[Array, " C"] = diffuse_parameter()
-    specular: Float[Array, " C"] = _specular()
-    alpha_x: Float[Array, ""] = _width("lobe width along the tangent")
-    alpha_y: Float[Array, ""] = _width("lobe width along the bitangent")
+    specular: Float[Array, " C"] = specular_parameter()
+    alpha_x: Float[Array, ""] = width_parameter("lobe width along the tangent")
+    alpha_y: Float[Array, ""] = width_parameter("lobe width along the bitangent")
+
+    @classmethod
+    def shapes(cls, half_width: float) -> list[dict[str, float]]:
+        """Those of the round lobe, stretched."""
+        return stretched_shapes(Ward.shapes(half_width), "alpha")
 
     def evaluate(self, g: Geometry) -> Float[Array, "..."]:
         """Value in 1/sr."""

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Iterable
-from functools import lru_cache
+from functools import cache, lru_cache
 
 from ..assembled import assemble
 from ..base import Parameter
@@ -55,7 +55,7 @@ def parts_of(*effects: str) -> Parts:
     return parts
 
 
-@lru_cache(maxsize=None)
+@cache
 def _composed(names: tuple[str, ...]) -> type[Composition]:
     parameters: dict[str, Parameter] = {}
     for name in names:
