@@ -72,6 +72,11 @@ class PolarStencil(eqx.Module):
         index = np.clip(position.astype(np.int32), 1, INTERVALS - 2)
         return PolarStencil(index, position - index, max_angle)
 
+    @staticmethod
+    def cosines(max_angle: float) -> np.ndarray:
+        """Cosines of the angles over [0, ``max_angle``] radians that :meth:`tabulate` asks for, ``[NODES]``."""
+        return _tables(max_angle, "float64")[0]
+
     def tabulate(self, function: Callable[[Array], Array]) -> Array:
         """``function(cos(theta))`` on the uniform table, ``[INTERVALS + 1]``."""
         cosines, matrix = _tables(self.max_angle, str(self.fraction.dtype))
