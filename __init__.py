@@ -16,6 +16,7 @@ if TYPE_CHECKING:
     from .models import compose as compose
     from .models import model as model
     from .models import parameter as parameter
+    from .models.factory import microfacet as microfacet
     from .tables import Table as Table
     from .tables import load as load
     from .tables import save as save
@@ -37,6 +38,7 @@ _PUBLIC = {
     "fit": "fitting",
     "fit_many": "fitting",
     "load": "tables",
+    "microfacet": "models.factory",
     "model": "models",
     "parameter": "models",
     "save": "tables",

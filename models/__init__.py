@@ -8,19 +8,35 @@ import numpy as np
 from jaxtyping import ArrayLike
 
 from .abc import ABC
+from .abc_smooth import ABCSmooth
 from .ashikhmin_shirley import AshikhminShirley, AshikhminShirleyAnisotropic
 from .base import BRDF, Interval, Parameter, channels, evaluate_channels, parameter, parameters_of
+from .beckmann import Beckmann
 from .blinn_phong import BlinnPhong
+from .cook_torrance import CookTorrance, CookTorranceBlinn, CookTorranceGaussian
+from .disney import Disney, DisneyAnisotropic
 from .effects import EFFECTS, compose
+from .epd import EPD
+from .factory import by_name
+from .ggx import GGX
 from .gtr import GTR
+from .lafortune import Lafortune, Lafortune2, Lafortune3
 from .lambert import Lambert
+from .low_microfacet import LowMicrofacet
 from .max_phong import MaxPhong
 from .modified_blinn_phong import ModifiedBlinnPhong
 from .modified_phong import ModifiedPhong
 from .oren_nayar import OrenNayar, OrenNayarFull
+from .pbr import PBR
 from .phong import Phong
+from .schlick import Schlick, SchlickTwoLayers
+from .schwenk import Schwenk
 from .sgd import SGD
+from .strauss import Strauss
+from .student_t import StudentT
 from .ward import Ward, WardAnisotropic
+from .ward_bounded import WardBounded, WardBoundedAnisotropic
+from .ward_duer import WardDuer, WardDuerAnisotropic
 
 MODELS: dict[str, tuple[type[BRDF], ...]] = {
     "gtr": (GTR,),
@@ -29,6 +45,19 @@ MODELS: dict[str, tuple[type[BRDF], ...]] = {
     "ward": (Ward, WardAnisotropic),
     "ashikhmin_shirley": (AshikhminShirley, AshikhminShirleyAnisotropic),
     "lambert": (Lambert,),
+    "ggx": (GGX,),
+    "beckmann": (Beckmann,),
+    "pbr": (PBR,),
+    "cook_torrance": (CookTorrance,),
+    "cook_torrance_blinn": (CookTorranceBlinn,),
+    "cook_torrance_gaussian": (CookTorranceGaussian,),
+    "epd": (EPD,),
+    "student_t": (StudentT,),
+    "low_microfacet": (LowMicrofacet,),
+    "abc_smooth": (ABCSmooth,),
+    "ward_duer": (WardDuer, WardDuerAnisotropic),
+    "ward_bounded": (WardBounded, WardBoundedAnisotropic),
+    "disney": (Disney, DisneyAnisotropic),
     "phong": (Phong,),
     "blinn_phong": (BlinnPhong,),
     "modified_phong": (ModifiedPhong,),
@@ -36,12 +65,20 @@ MODELS: dict[str, tuple[type[BRDF], ...]] = {
     "max_phong": (MaxPhong,),
     "oren_nayar": (OrenNayar,),
     "oren_nayar_full": (OrenNayarFull,),
+    "lafortune": (Lafortune,),
+    "lafortune2": (Lafortune2,),
+    "lafortune3": (Lafortune3,),
+    "schlick": (Schlick,),
+    "schlick_two_layers": (SchlickTwoLayers,),
+    "strauss": (Strauss,),
+    "schwenk": (Schwenk,),
 }
 """Every named model: its isotropic form first, then the anisotropic one where there is one."""
 
 
 def variants(name: str) -> tuple[type[BRDF], ...]:
-    """The classes that go by a name: of :data:`MODELS`, or effects joined by ``+`` (see :func:`compose`).
+    """The classes that go by a name: of :data:`MODELS`, effects joined by ``+`` (see :func:`compose`), or blocks of a
+    microfacet model (see :func:`brdfit.microfacet`).
 
     Raises ValueError for any other name, and for effects that do not go together.
     """
@@ -49,6 +86,8 @@ def variants(name: str) -> tuple[type[BRDF], ...]:
         return MODELS[name]
     if "+" in name or name in EFFECTS:
         return (compose(*name.split("+")),)
+    if name.startswith("microfacet("):
+        return (by_name(name),)
     raise ValueError(f"unknown model {name!r}: choose from {', '.join(MODELS)}, or join effects by +: {', '.join(EFFECTS)}")
 
 

@@ -16,10 +16,12 @@ from .diffuse import lambert
 
 
 def width_parameter(meaning: str) -> Any:
+    """Width of a Gaussian of slopes."""
     return parameter(meaning, valid=POSITIVE, search=(1e-4, 30), default=0.15, log=True)
 
 
 def specular_parameter() -> Any:
+    """Scale of the lobe."""
     return parameter("scale of the lobe", per_channel=True, linear=True, valid=NOT_NEGATIVE, default=0.2)
 
 

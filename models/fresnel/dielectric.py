@@ -14,7 +14,11 @@ def dielectric(ior: Float[Array, ""], g: Geometry) -> Float[Array, "..."]:
     For ``ior`` >= 1. g - c cancels for ior near 1: it is written (ior^2 - 1)/(g + c). Where g > 2c the ratio is written
     1 - 2c/(g + c), because the derivative of the quotient cancels at grazing.
     """
-    c = g.cos_d
+    return dielectric_at(ior, g.cos_d)
+
+
+def dielectric_at(ior: Float[Array, ""], c: Float[Array, "..."]) -> Float[Array, "..."]:
+    """:func:`dielectric` at a cosine c of incidence."""
     n2m1 = (ior - 1) * (ior + 1)
     root = jnp.sqrt(n2m1 + c * c)
     difference = n2m1 / (root + c)

@@ -43,9 +43,13 @@ def averted_area(ndf: NDF, cosine: Float[Array, "..."], rule: Rule | None = None
 
     Error of G1 with 170 nodes, up to 89.995 degrees, against eight times as many: 1e-10 for GTR with alpha 1e-9..10 and
     gamma 0.01..1e7 (Gaussian lobes; 2e-15 for gamma < 10), 4e-14 for SGD with alpha 1e-7..30 and p -10..60
-    (tests/test_masking.py::test_against_the_projected_area). ``rule`` stands in for those nodes.
+    (tests/test_masking.py::test_against_the_projected_area). ``rule`` stands in for those nodes. A distribution that has
+    a form of N of its own, as its method ``averted_area``, is asked for it.
     """
     cosine = jnp.asarray(cosine)
+    own = getattr(ndf, "averted_area", None)
+    if own is not None:
+        return jnp.asarray(own(cosine))
     rule = rule or smith_kernel(NODES, getattr(ndf, "smith_reach", REACH))
     cos2_t, g, slope, bend = (jnp.asarray(a, cosine.dtype) for a in rule)
     oblique = cosine < 0.5
@@ -66,13 +70,20 @@ def smith_lambda(ndf: NDF, cosine: Float[Array, "..."]) -> Float[Array, "..."]:
     return averted_area(ndf, cosine) / cosine
 
 
+def _both_areas(ndf: NDF, g: Geometry, rule: Rule | None) -> tuple[Float[Array, "..."], Float[Array, "..."]]:
+    """N at light and viewer: through a table of polar angles where there is one and N costs more than to read it."""
+    if getattr(ndf, "elementary", False):
+        return averted_area(ndf, g.cos_i), averted_area(ndf, g.cos_o)
+    return g.at_polar(lambda c: averted_area(ndf, c, rule))
+
+
 def smith_correlated(ndf: NDF, g: Geometry, rule: Rule | None = None) -> Float[Array, "..."]:
     """G / (4 n.l n.v), height-correlated G = 1/(1 + Lambda(l) + Lambda(v)) (Heitz 2014, eq. 99)."""
-    light, viewer = g.at_polar(lambda c: averted_area(ndf, c, rule))
+    light, viewer = _both_areas(ndf, g, rule)
     return 0.25 / (g.cos_i * (g.cos_o + viewer) + g.cos_o * light)
 
 
 def smith_separable(ndf: NDF, g: Geometry, rule: Rule | None = None) -> Float[Array, "..."]:
     """G / (4 n.l n.v), G = G1(l) G1(v)."""
-    light, viewer = g.at_polar(lambda c: averted_area(ndf, c, rule))
+    light, viewer = _both_areas(ndf, g, rule)
     return 0.25 / ((g.cos_i + light) * (g.cos_o + viewer))

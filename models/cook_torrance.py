@@ -1,0 +1,37 @@
+"""Cook-Torrance: facets in V-shaped grooves, with three distributions."""
+
+from __future__ import annotations
+
+from .factory import named
+
+_COMMON = """
+
+    Divisor 4 in place of the pi of Cook & Torrance (1982), eq. 2; Schlick's Fresnel in place of theirs.
+    Reciprocal. The lobe's albedo stays below specular times 1 at all angles; the value is unbounded towards grazing. Has
+    kinks where two of the three terms of G are equal.
+"""
+
+CookTorrance = named(
+    "cook_torrance",
+    ("beckmann", "vcavity", "schlick", "lambert"),
+    """f = diffuse/pi + F_schlick(specular, c_d) D_beckmann G_vcavity / (4 n.l n.v) (Cook & Torrance 1982, eq. 2 to 4)."""
+    + _COMMON,
+    ("cook1982",),
+)
+CookTorranceBlinn = named(
+    "cook_torrance_blinn",
+    ("blinn", "vcavity", "schlick", "lambert"),
+    """f = diffuse/pi + F_schlick(specular, c_d) D_blinn G_vcavity / (4 n.l n.v), D_blinn = (exponent + 2)/(2 pi)
+    (n.h)^exponent (Blinn 1977; Schwenk 2011, eq. 35 and 37)."""
+    + _COMMON,
+    ("cook1982",),
+)
+CookTorranceGaussian = named(
+    "cook_torrance_gaussian",
+    ("gaussian", "vcavity", "schlick", "lambert"),
+    """f = diffuse/pi + F_schlick(specular, c_d) D G_vcavity / (4 n.l n.v), D = k exp(-theta_h^2/alpha^2) normalised
+    (Torrance
+    & Sparrow 1967; Blinn 1977; Schwenk 2011, eq. 35 and 36, where k is free)."""
+    + _COMMON,
+    ("cook1982",),
+)

@@ -1,0 +1,43 @@
+"""Exponential power distribution of slopes (Holzschuch & Pacanowski 2017)."""
+
+from __future__ import annotations
+
+import equinox as eqx
+import jax
+import jax.numpy as jnp
+from jaxtyping import Array, Float
+
+_GONE = 7.0
+"""ln of an exponent: exp(-e^7) is 0 in double precision."""
+
+
+class EPD(eqx.Module):
+    """D = exp(-(tan^2(theta_m)/alpha^2)^p) / (pi alpha^2 Gamma(1 + 1/p) (n.m)^4), ``alpha``, ``p`` > 0.
+
+    p = 1 is Beckmann's distribution; p < 1 has a sharper peak and a longer tail, and a cusp at the pole for p <= 1/2.
+    Gamma(1 + 1/p) alpha^2 is the integral of the exponential over tan^2: that is the normalisation. At the pole itself
+    derivatives by the angle are 0, which is their mean over all sides of the cusp.
+    """
+
+    alpha: Float[Array, ""]
+    p: Float[Array, ""]
+
+    def __call__(self, sin2: Float[Array, "..."], cos2: Float[Array, "..."]) -> Float[Array, "..."]:
+        """D in 1/sr."""
+        single = jnp.result_type(sin2, self.alpha) == jnp.float32
+        alpha, p = jax.lax.stop_gradient((self.alpha, self.p))
+        # Guards: ln 0 at the pole, and towards the horizon 1/cos^4 beyond the largest number where exp is 0, 0 * inf = NaN
+        # (tests/test_ndf.py::test_finite_at_both_ends).
+        peak = sin2 <= (1e-20 if single else 1e-60) * alpha**2 * cos2
+        reach = jnp.exp(jnp.minimum(_GONE / p, 80 if single else 600))
+        lost = sin2 / reach > alpha**2 * cos2
+        aside = peak | lost
+        sin2, cos2_h = jnp.where(aside, 0.5, sin2), jnp.where(aside, 0.5, cos2)
+        log = jnp.log(sin2 / cos2_h) - 2 * jnp.log(self.alpha)
+        half = jnp.exp(jnp.where(aside, 0, -jnp.exp(self.p * jnp.where(aside, 0, log)) / 2))
+        k = jnp.exp(-jax.lax.lgamma(1 + 1 / self.p)) / (jnp.pi * self.alpha**2)
+        cos2 = jnp.where(lost, 1, cos2)
+        return jnp.where(lost, 0, k * half / cos2**2 * half)
+
+
+__all__ = ["EPD"]

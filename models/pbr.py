@@ -1,0 +1,18 @@
+"""The physically based shading of real-time renderers: microfacets over a body that gets what they transmit."""
+
+from __future__ import annotations
+
+from .factory import named
+
+PBR = named(
+    "pbr",
+    ("ggx", "smith", "schlick", "transmitted"),
+    """f = (1 - F) diffuse/pi + F D_ggx G / (4 n.l n.v), F = F_schlick(specular, c_d), G height-correlated Smith of D_ggx.
+
+    Options, by ``brdfit.microfacet(ndf, masking, "schlick", "transmitted")``: "ggx" with masking "smith",
+    "smith_separable", or the approximations "hammon" (correlated) and "schlick_smith" (separable); "beckmann" with "smith",
+    "smith_separable", "walter" and "walter_separable". Reciprocal. 1 - F is taken at the half vector, so what the body gets
+    is not what the lobe transmits: for diffuse = specular = 1 the albedo is 1 in the furnace of a mirror (alpha -> 0) at
+    normal incidence only. Known failure: diffuse and specular trade off where F0 is large.
+    """,
+)
