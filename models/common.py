@@ -5,6 +5,8 @@ from __future__ import annotations
 from collections.abc import Iterable
 from typing import Any
 
+import numpy as np
+
 from .base import NOT_NEGATIVE, parameter
 
 
@@ -21,6 +23,13 @@ def lobe_parameter() -> Any:
 def exponent_parameter(meaning: str = "exponent of the cosine") -> Any:
     """Exponent of a power of a cosine."""
     return parameter(meaning, valid=NOT_NEGATIVE, search=(1e-2, 1e7), default=50, log=True)
+
+
+def exponent_shapes(half_width: float) -> list[dict[str, float]]:
+    """Exponents of cosines narrower and wider than a lobe of this half-width, and such as serve as body."""
+    exponent = -np.log(2) / np.log(np.cos(min(half_width, 1.5)))
+    exponents = [float(np.clip(exponent * k, 2e-2, 5e6)) for k in (0.1, 0.3, 1.0, 3.0, 10.0)]
+    return [{"exponent": e} for e in (*exponents, 1.0)]
 
 
 def stretched_shapes(shapes: Iterable[dict[str, float]], name: str) -> list[dict[str, float]]:

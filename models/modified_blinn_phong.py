@@ -9,7 +9,7 @@ from jaxtyping import Array, Float
 
 from ..geometry import Geometry
 from .base import BRDF
-from .common import diffuse_parameter, exponent_parameter, lobe_parameter
+from .common import diffuse_parameter, exponent_parameter, exponent_shapes, lobe_parameter
 from .diffuse import lambert
 from .ndf.power_cosine import log_cosine
 
@@ -30,6 +30,11 @@ class ModifiedBlinnPhong(BRDF):
     diffuse: Float[Array, " C"] = diffuse_parameter()
     specular: Float[Array, " C"] = lobe_parameter()
     exponent: Float[Array, ""] = exponent_parameter()
+
+    @classmethod
+    def shapes(cls, half_width: float) -> list[dict[str, float]]:
+        """Narrower and wider than the lobe is."""
+        return exponent_shapes(half_width)
 
     def evaluate(self, g: Geometry) -> Float[Array, "..."]:
         """Value in 1/sr."""

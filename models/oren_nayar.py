@@ -34,6 +34,11 @@ class OrenNayar(BRDF):
     diffuse: Float[Array, " C"] = diffuse_parameter()
     sigma: Float[Array, ""] = _sigma()
 
+    @classmethod
+    def shapes(cls, half_width: float) -> list[dict[str, float]]:
+        """From smooth to rough; the half-width says nothing of a body."""
+        return [{"sigma": s} for s in (0.1, 0.3, 0.6, 1.5)]
+
     def evaluate(self, g: Geometry) -> Float[Array, "..."]:
         """Value in 1/sr."""
         return oren_nayar(self.diffuse, self.sigma, g)
@@ -45,7 +50,7 @@ class OrenNayarFull(BRDF):
     29; the coefficients stand at :func:`~brdfit.models.diffuse.oren_nayar_full`).
 
     The last term is light reflected twice within a groove: the BRDF is not affine in diffuse. Reciprocal. Energy is not
-    bounded by the form, since C1 to C3 are fits to numerical integrals. Known failure: for sigma above some 0.6 it is negative
+    bounded by the form, C1 to C3 being fits to numerical integrals. Known failure: for sigma above some 0.6 it is negative
     between grazing light and a grazing viewer opposite.
     """
 
@@ -54,6 +59,11 @@ class OrenNayarFull(BRDF):
 
     diffuse: Float[Array, " C"] = parameter("albedo of the walls", per_channel=True, valid=NOT_NEGATIVE, default=0.5)
     sigma: Float[Array, ""] = _sigma()
+
+    @classmethod
+    def shapes(cls, half_width: float) -> list[dict[str, float]]:
+        """From smooth to rough; the half-width says nothing of a body."""
+        return [{"sigma": s} for s in (0.1, 0.3, 0.6, 1.5)]
 
     def evaluate(self, g: Geometry) -> Float[Array, "..."]:
         """Value in 1/sr."""

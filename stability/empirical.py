@@ -94,6 +94,66 @@ def oren_nayar_full(l: Vector, v: Vector, diffuse: Any, sigma: Any) -> Any:
     return once + mpf("0.17") * diffuse**2 / mp.pi * s / (s + mpf("0.13")) * (1 - c * (2 * beta / mp.pi) ** 2)
 
 
+def _lafortune_lobe(l: Vector, v: Vector, tilt: Any, exponent: Any) -> Any:
+    """Ngan et al. (2005): C_xy (l_x v_x + l_y v_y) + C_z l_z v_z to a power, over the largest coefficient to that power."""
+    xy, z = -mp.sin(tilt), mp.cos(tilt)
+    base = xy * (l[0] * v[0] + l[1] * v[1]) + z * l[2] * v[2]
+    return (exponent + 2) / (2 * mp.pi) * _power(base / max(abs(xy), abs(z)), exponent)
+
+
+def lafortune(l: Vector, v: Vector, diffuse: Any, **lobes: Any) -> Any:
+    """Lafortune et al. (1997), eq. 9."""
+    out = diffuse / mp.pi
+    for end in ("", "_1", "_2", "_3"):
+        if "tilt" + end in lobes:
+            out += lobes["specular" + end] * _lafortune_lobe(l, v, lobes["tilt" + end], lobes["exponent" + end])
+    return out
+
+
+def _schlick_fresnel(f0: Any, l: Vector, v: Vector) -> Any:
+    return f0 + (1 - f0) * (1 - _dot(l, _half(l, v))) ** 5
+
+
+def _schlick_d(r: Any, l: Vector, v: Vector) -> Any:
+    """Schwenk (2011), eq. 49, with p = 1 and pi where the text has lost it."""
+    t = _half(l, v)[2]
+    z = r / (1 + r * t**2 - t**2) ** 2
+    g = l[2] / (r - r * l[2] + l[2]) * v[2] / (r - r * v[2] + v[2])
+    return (1 - g) / mp.pi + g / (4 * mp.pi * l[2] * v[2]) * z
+
+
+def schlick(l: Vector, v: Vector, specular: Any, roughness: Any) -> Any:
+    return _schlick_fresnel(specular, l, v) * _schlick_d(roughness, l, v)
+
+
+def schlick_two_layers(l: Vector, v: Vector, specular: Any, base: Any, roughness: Any, base_roughness: Any) -> Any:
+    """Schwenk (2011), eq. 48."""
+    f = _schlick_fresnel(specular, l, v)
+    return f * _schlick_d(roughness, l, v) + (1 - f) * _schlick_fresnel(base, l, v) * _schlick_d(base_roughness, l, v)
+
+
+def strauss(l: Vector, v: Vector, diffuse: Any, smoothness: Any, metalness: Any, transparency: Any) -> Any:
+    """Schwenk (2011), eq. 46 and what follows it, over pi."""
+    s, m, t = smoothness, metalness, transparency
+    kf, kg, kj = mpf(112) / 100, mpf(101) / 100, mpf(1) / 10
+    i, o = (2 * mp.atan2(mp.hypot(x[0], x[1]), x[2]) / mp.pi for x in (l, v))
+    f = (1 / (i - kf) ** 2 - 1 / kf**2) / (1 / (1 - kf) ** 2 - 1 / kf**2)
+    gi, go = ((1 / (1 - kg) ** 2 - 1 / (x - kg) ** 2) / (1 / (1 - kg) ** 2 - 1 / kg**2) for x in (i, o))
+    rd = (1 - s**3) * (1 - t)
+    rn = (1 - t) - rd
+    j = f * gi * go
+    rs = min(1, rn + (rn + kj) * j) * _power(_dot(_mirror(l), v), 3 / (1 - s))
+    cs = 1 + m * (1 - f) * (diffuse - 1)
+    return (rd * (1 - m * s) * diffuse + rs * cs / l[2]) / mp.pi
+
+
+def schwenk(l: Vector, v: Vector, diffuse: Any, specular: Any, smoothness: Any, scale: Any) -> Any:
+    """Schwenk (2011), section 4.2.4, over pi."""
+    h = _half(l, v)
+    js = smoothness**2 / _dot(v, h) * _schlick_fresnel(specular, l, v) * h[2] ** (2 / (1 + mpf(1) / 255 - smoothness))
+    return (diffuse + scale * js) / mp.pi
+
+
 MODELS: dict[str, Callable[..., Any]] = {
     "Phong": phong,
     "ModifiedPhong": modified_phong,
@@ -102,6 +162,13 @@ MODELS: dict[str, Callable[..., Any]] = {
     "ModifiedBlinnPhong": modified_blinn_phong,
     "OrenNayar": oren_nayar,
     "OrenNayarFull": oren_nayar_full,
+    "Lafortune": lafortune,
+    "Lafortune2": lafortune,
+    "Lafortune3": lafortune,
+    "Schlick": schlick,
+    "SchlickTwoLayers": schlick_two_layers,
+    "Strauss": strauss,
+    "Schwenk": schwenk,
 }
 """By the name of the class under test: functions of unit vectors and parameters."""
 

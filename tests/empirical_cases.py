@@ -35,8 +35,8 @@ class Row:
     reciprocal: bool = True
     kink: Any = None
     """Mask ``[n]`` of directions without derivative."""
-    faint: Any = None
-    """Mask ``[n]`` of directions where a cosine that a lobe is a power of is so small that float32 does not hold it."""
+    tolerance: float = 1e-11
+    """Relative error of the value."""
     energy: tuple[Case, ...] = ()
     """Cases whose albedo must not exceed 1."""
     truth: Case = field(default_factory=dict)
@@ -73,19 +73,43 @@ LOBE = {"diffuse": 0.1, "specular": 0.2, "exponent": 50.0}
 EXPONENTS = [{"exponent": e} for e in (1.0, 3.0, 1e3, 1e7)] + [{"diffuse": 0.0, "exponent": 300.0}]
 FULL = [{"diffuse": 0.0, "specular": 1.0, "exponent": e} for e in (0.0, 1.0, 4.0, 60.0)]
 LEVEL = np.abs(WI[:, 2] - WO[:, 2]) < 1e-6
-ENDING = np.abs(2 * WI[:, 2] * WO[:, 2] - (WI * WO).sum(-1)) < 0.01
-"""Where r.v is nearly 0."""
+NORMAL = np.maximum(WI[:, 2], WO[:, 2]) > 1 - 1e-9
+"""Where a polar angle has no derivative."""
 CREASE = LEVEL | (np.abs((WI * WO)[:, :2].sum(-1)) < 1e-9)
 """Where in addition l and v lie at right angles about the normal, or along it."""
 ROUGH = {"diffuse": 0.5, "sigma": 0.4}
 ROUGHER = [{"sigma": s} for s in (0.0, 1e-2, 1.0, 3.0)] + [{"diffuse": 0.0}, {"diffuse": 1.0}]
+TILTED = {"diffuse": 0.1, "specular": 0.2, "tilt": 0.75, "exponent": 50.0}
+TILTS = [{"tilt": t} for t in (0.0, -0.7, -0.9, 0.9, 1.5, np.pi / 2, -np.pi / 2)]
+TWO = {
+    "diffuse": 0.1,
+    "specular_1": 0.2,
+    "specular_2": 0.1,
+    "tilt_1": 0.82,
+    "tilt_2": -0.7,
+    "exponent_1": 90.0,
+    "exponent_2": 5.0,
+}
+THREE = {**TWO, "specular_3": 0.05, "tilt_3": 0.6, "exponent_3": 9.0}
+TILTS_1 = [{"tilt_1": t, "exponent_1": e} for t in (0.0, -0.8, 1.0) for e in (3.0, 1e4)]
+LAYERS = {"specular": 0.04, "base": 0.3, "roughness": 0.02, "base_roughness": 0.8}
+PLASTIC = {"diffuse": 0.4, "smoothness": 0.6, "metalness": 0.3, "transparency": 0.1}
+SMOOTH = [{"smoothness": s} for s in (0.0, 0.9, 0.999)] + [{"metalness": 1.0, "transparency": 0.0}, {"transparency": 0.9}]
+GLOSSY = {"diffuse": 0.1, "specular": 0.5, "smoothness": 0.7, "scale": 1.0}
 
 EMPIRICAL: tuple[Row, ...] = (
-    row("phong", LOBE, *EXPONENTS, reciprocal=False, faint=ENDING, truth={"exponent": 40.0}),
-    row("modified_phong", LOBE, *EXPONENTS, energy=FULL, faint=ENDING, truth={"exponent": 40.0}),
-    row("max_phong", LOBE, *EXPONENTS, kink=LEVEL, energy=FULL, faint=ENDING, truth={"exponent": 40.0}),
+    row("phong", LOBE, *EXPONENTS, reciprocal=False, truth={"exponent": 40.0}),
+    row("modified_phong", LOBE, *EXPONENTS, energy=FULL, truth={"exponent": 40.0}),
+    row("max_phong", LOBE, *EXPONENTS, kink=LEVEL, energy=FULL, truth={"exponent": 40.0}),
     row("blinn_phong", LOBE, *EXPONENTS, {"exponent": 0.0}, truth={"exponent": 80.0}),
     row("modified_blinn_phong", LOBE, *EXPONENTS, {"exponent": 0.0}, energy=FULL, truth={"exponent": 80.0}),
     row("oren_nayar", ROUGH, *ROUGHER, kink=CREASE, energy=[{"diffuse": 0.984, "sigma": s} for s in (0.1, 0.2, 0.5, 3.0)]),
     row("oren_nayar_full", ROUGH, *ROUGHER, kink=CREASE),
+    row("lafortune", TILTED, *TILTS, *EXPONENTS[1:], truth={"tilt": 0.82, "exponent": 40.0}),
+    row("lafortune2", TWO, *TILTS_1, truth=TWO),
+    row("lafortune3", THREE, *TILTS_1, truth=THREE),
+    row("schlick", {"specular": 0.3, "roughness": 0.1}, *({"roughness": r} for r in (1.0, 1e-9, 1e-4)), {"specular": 1e-3}),
+    row("schlick_two_layers", LAYERS, {"roughness": 1e-9}, {"base_roughness": 1.0, "specular": 0.0}, {"specular": 1.0}),
+    row("strauss", PLASTIC, *SMOOTH, reciprocal=False, kink=NORMAL, tolerance=1e-9),  # angles of 1e-8 are lost in the cosine
+    row("schwenk", GLOSSY, {"smoothness": 0.0}, {"smoothness": 1.0, "diffuse": 0.0}, {"specular": 0.0}, {"scale": 0.0}),
 )

@@ -61,14 +61,14 @@ def found(name: str) -> Found:
 
 @rows
 def test_value(row: Row):
-    """Against 40 digits, to 1e-11; 500 values and more."""
+    """Against 40 digits, to what is promised of it; 500 values and more."""
     got = found(row.name)[0][:, :N]
     want = np.array([[float(oracle.value(row.name, dict(c), a, b)) for a, b in zip(WI, WO, strict=True)] for c in row.cases])
     assert want.size >= 500
     error = np.abs(got - want) / (np.abs(want) + 1e-280)
     w = np.unravel_index(np.nanargmax(error), error.shape)
     assert np.isfinite(got).all()
-    assert error.max() <= 1e-11, (error.max(), row.cases[w[0]], WI[w[1]], WO[w[1]], got[w], want[w])
+    assert error.max() <= row.tolerance, (error.max(), row.cases[w[0]], WI[w[1]], WO[w[1]], got[w], want[w])
 
 
 @rows
@@ -107,19 +107,23 @@ def test_reciprocity(row: Row):
 
 @rows
 def test_single_precision(row: Row):
-    """float32 on numbers that it holds, against float64: 1e-5, and 3e-5 below 1e-12 of the peak, as of the other models."""
+    """float32 on numbers that it holds, against float64: 1e-5 of the value or the body term, or a dozen times what one
+    rounding of the parameters and directions changes, which is what a formula's own roundings come to.
+    """
     stacked = row.stacked(np.float32)
     wi, wo = (w.astype(np.float32) for w in (ALL_WI, ALL_WO))
     got, slopes = evaluate(row, stacked, wi, wo, np.float32)
-    want, _ = evaluate(row, stacked, wi.astype(float), wo.astype(float))
+    want, exact = evaluate(row, stacked, wi.astype(float), wo.astype(float))
     assert np.isfinite(got).all()
     body = np.array([c.get("diffuse", 0) / np.pi for c in row.cases])[:, None]
-    error = np.abs(got - want) / (np.maximum(np.abs(want), body) + 1e-23)
-    if row.faint is not None:
-        error[:, : 2 * N] = np.where(np.tile(row.faint, 2), 0, error[:, : 2 * N])
-    tolerance = np.where(want > 1e-12 * want.max(1, keepdims=True), 1e-5, 3e-5)
-    w = np.unravel_index(np.argmax(error / tolerance), error.shape)
-    assert (error <= tolerance).all(), (error[w], row.cases[w[0]], wi[w[1]], wo[w[1]], got[w], want[w])
+    size = {n: np.array([c[n] for c in row.cases])[:, None] for n in row.cases[0]}
+    for name, w in (("wi", wi), ("wo", wo)):
+        along = sum(w[:, k] * exact[f"{name}_{k}"] for k in range(3))
+        exact |= {f"{name}_{k}": exact[f"{name}_{k}"] - w[:, k] * along for k in range(3)}
+    moved = sum(np.abs(slope * size.get(n, 1.0)) for n, slope in exact.items()) * 2.0**-24
+    error = np.abs(got - want) / (np.maximum(1e-5 * np.maximum(np.abs(want), body), 12 * moved) + 1e-28)
+    w = np.unravel_index(np.argmax(error), error.shape)
+    assert (error <= 1).all(), (error[w], row.cases[w[0]], wi[w[1]], wo[w[1]], got[w], want[w])
     for name, slope in slopes.items():
         assert np.isfinite(slope).all(), name
 

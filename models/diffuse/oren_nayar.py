@@ -6,6 +6,7 @@ import jax.numpy as jnp
 from jaxtyping import Array, Float
 
 from ...geometry import Geometry
+from ...special import sine
 
 
 def oren_nayar(albedo: Float[Array, ""], sigma: Float[Array, ""], g: Geometry) -> Float[Array, "..."]:
@@ -31,7 +32,7 @@ def oren_nayar_full(albedo: Float[Array, ""], sigma: Float[Array, ""], g: Geomet
     """
     s2 = sigma**2
     high, low = jnp.maximum(g.cos_i, g.cos_o), jnp.minimum(g.cos_i, g.cos_o)  # cosines of beta and of alpha
-    sin_a, sin_b = _sine(low), _sine(high)
+    sin_a, sin_b = sine(low), sine(high)
     alpha, beta = jnp.arctan2(sin_a, low), jnp.arctan2(sin_b, high)
     t = g.tangential_product  # c sin(alpha) sin(beta): c alone has no limit at normal incidence
     q = 2 / jnp.pi
@@ -48,10 +49,3 @@ def oren_nayar_full(albedo: Float[Array, ""], sigma: Float[Array, ""], g: Geomet
     one = one + 0.125 * rough * (q * alpha * q * beta) ** 2 / (sin_a * sin_b) * flank * tan_mean
     two = 0.17 * albedo * s2 / (s2 + 0.13) * (1 - t * y**2 / (sin_a * sin_b))
     return albedo / jnp.pi * (one + two)
-
-
-def _sine(cosine: Float[Array, "..."]) -> Float[Array, "..."]:
-    square = (1 - cosine) * (1 + cosine)
-    # Guard: the root and 0/0 at normal incidence, where the terms with sines vanish. The eighth power of the sine, in
-    # derivatives, stays above the smallest number (tests/test_empirical.py::test_finite, test_single_precision).
-    return jnp.sqrt(jnp.maximum(square, jnp.finfo(square.dtype).tiny ** 0.25))
