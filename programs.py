@@ -2,7 +2,8 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable
+from collections import defaultdict
+from collections.abc import Callable, Hashable
 from functools import cache, wraps
 from threading import Lock
 from typing import Any, ParamSpec, TypeVar
@@ -21,21 +22,41 @@ _making = Lock()
 
 
 def program(function: Callable[P, R]) -> Callable[P, R]:
-    """Compile a function for the shapes of its arrays; all else is static. For calls from Python, not from a program."""
+    """Compile a function for the shapes of its arrays; all else is static. For calls from Python, not from a program.
+
+    Threads that ask at once for the same program wait for the one that compiles it.
+    """
 
     @cache
     def compiled() -> Any:
         compiler: Any = eqx.filter_jit  # passes on what it does not know
         return compiler(function, compiler_options=_understood())
 
+    first: defaultdict[Hashable, Lock] = defaultdict(Lock)
+    made: set[Hashable] = set()
+
     @wraps(function)
     def call(*args: P.args, **kwargs: P.kwargs) -> R:
-        with _making:  # two threads that ask at once get the same one
-            it = compiled()
-        result: R = it(*args, **kwargs)
+        kind = _kind((args, kwargs))
+        result: R
+        if kind in made:
+            result = compiled()(*args, **kwargs)
+            return result
+        with _making:
+            it, turn = compiled(), first[kind]
+        with turn:
+            result = it(*args, **kwargs)
+            made.add(kind)
         return result
 
     return call
+
+
+def _kind(arguments: Any) -> Hashable:
+    """What a program is compiled for: shapes and types of arrays, and all else as it is."""
+    leaves, structure = jax.tree.flatten(arguments)
+    kinds = ((x.shape, x.dtype) if hasattr(x, "dtype") else x for x in leaves)
+    return structure, *kinds, jax.config.read("jax_enable_x64")
 
 
 @cache

@@ -13,10 +13,11 @@ from numpy.typing import NDArray
 from ..models import parameters_of
 from ..programs import program
 from .coordinates import Chart
-from .gram import Problem, statistics
+from .gram import Problem, Span, statistics
 from .losses import Loss
 from .result import Named
 from .solver import Box
+from .threads import in_threads
 from .uncertainty import uncertainty
 
 Reals = NDArray[np.float64]
@@ -63,10 +64,11 @@ class Judgement:
 def judge(problem: Problem, x: Reals, box: Box, losses: tuple[Loss, ...]) -> Judgement:
     """Parameters, their covariances and the errors at an optimum (one pass over all cells)."""
     chart, channels, n = problem.chart, problem.channels, problem.size
-    found = _statistics(problem, x, losses)
+    halves = in_threads(lambda span: _statistics(problem, x, losses, span), Span.halves(problem.samples))
+    found = jax.tree.map(lambda *parts: np.sum(parts, 0), *halves)
     at_lower, at_upper, free = x <= box.lower, x >= box.upper, np.asarray(box.free)
-    bands = np.asarray(found.bands).reshape(-1, n + 1, n + 1)
-    u = uncertainty(bands, np.asarray(found.middle), free & ~at_lower & ~at_upper)
+    bands = found.bands.reshape(-1, n + 1, n + 1)
+    u = uncertainty(bands, found.middle, free & ~at_lower & ~at_upper)
     values, slopes = _parameters(chart, x, channels)
     specs = parameters_of(chart.cls)
     parameters = {p.name: np.asarray(values[p.name]) if p.per_channel else np.asarray(values[p.name])[0] for p in specs}
@@ -103,7 +105,7 @@ def judge(problem: Problem, x: Reals, box: Box, losses: tuple[Loss, ...]) -> Jud
         statistical / scale[:, None] / scale,
         tuple(label for label, u in zip(labels, unknown, strict=True) if u),
     )
-    return Judgement(estimate, np.asarray(found.errors), u.shift)
+    return Judgement(estimate, np.sqrt(found.sums[:, 0] / found.sums[:, 1]), u.shift)
 
 
 def _label(row: tuple[str, int | None]) -> str:

@@ -145,7 +145,7 @@ def fit(
     with jax.enable_x64(True), compilation() as compiled:
         ready = prepare(table, max_angle, measure, named_loss(loss), effort)
         used, bound_loss = ready.used, ready.loss
-        prepared = time.perf_counter()
+        prepared, early = time.perf_counter(), compiled.seconds
         frame: dict[str, Any] = {
             "material": table.material,
             "source": table.source,
@@ -161,7 +161,7 @@ def fit(
         if not used.any():
             reason = f"no measured cell has both polar angles within {max_angle:g} degrees: nothing to fit"
             return _nothing(
-                frame, reason, {"load": table.seconds, "prepare": prepared - begin, "compile": 0.0, "solve": 0.0}
+                frame, reason, {"load": table.seconds, "prepare": prepared - begin - early, "compile": early, "solve": 0.0}
             )
         box = tuple(sorted((n, float(a), float(b)) for n, (a, b) in (bounds or {}).items()))
         forms = charts(cls, bool(held), box)
@@ -174,7 +174,7 @@ def fit(
         found, judged = settle(found, Problem(ready.samples, bound_loss, found[0].problem.chart), named, effort)
         errors = judged.errors
     converged, reason = _verdict(found)
-    solve = time.perf_counter() - prepared - compiled.seconds
+    solve = time.perf_counter() - prepared - (compiled.seconds - early)
     return Fit(
         **frame,
         **vars(judged.estimate),
@@ -184,7 +184,7 @@ def fit(
         errors={e.name: float(v) for e, v in zip(named, errors, strict=True)},
         seconds={
             "load": table.seconds,
-            "prepare": prepared - begin,
+            "prepare": prepared - begin - early,
             "compile": compiled.seconds,
             "solve": max(solve, 0.0),
         },

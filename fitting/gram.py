@@ -50,25 +50,20 @@ class Problem(eqx.Module):
         return self.channels * len(self.chart.channel) + len(self.chart.shared)
 
 
-def _columns(
-    function: Callable[[list[Array]], tuple[Array, Array]], x: list[Array], twice: Sequence[int] = ()
-) -> tuple[list[Array], Array, Array]:
-    """Columns of the Jacobian of the first value, one forward derivative each, second derivatives by the coordinates
-    ``twice``, and both values.
+def _columns(function: Callable[[list[Array]], Any], x: list[Array], twice: Sequence[int] = ()) -> tuple[list[Any], Any]:
+    """Derivatives of a function by each coordinate, then second derivatives by the coordinates ``twice``; and its value.
 
     Coordinates are separate scalars and each derivative is taken with the others held, so that what a coordinate does not
     touch is absent from its program, and what channels share is computed once for all of them. The compiler finds the
-    copies of the values equal.
+    copies of the value equal.
     """
 
-    def slope(k: int, t: Array) -> Array:
-        along = jax.jvp(lambda t: function([*x[:k], t, *x[k + 1 :]]), (t,), (jnp.ones_like(t),))
-        tangent: Array = along[1][0]
-        return tangent
+    def slope(k: int, t: Array) -> Any:
+        return jax.jvp(lambda t: function([*x[:k], t, *x[k + 1 :]]), (t,), (jnp.ones_like(t),))[1]
 
     columns = [slope(k, t) for k, t in enumerate(x)]
     columns += [jax.jvp(partial(slope, k), (x[k],), (jnp.ones_like(x[k]),))[1] for k in twice]
-    return columns, *function(x)
+    return columns, function(x)
 
 
 def _root_weight(loss: Loss, g: Geometry, weight: Array) -> Array:
@@ -115,16 +110,8 @@ def _tables(chart: Chart, own: list[Array], shared: list[Array], g: Geometry) ->
         chart.model(o, s).evaluate(replace(g, tables=tables))
         return tables.made
 
-    slopes, values = _columns_of_lists(make, bent)
+    slopes, values = _columns(make, bent)
     return _Tables(bent, values, slopes)
-
-
-def _columns_of_lists(make: Callable[[list[Array]], list[Array]], x: list[Array]) -> tuple[list[list[Array]], list[Array]]:
-    def along(k: int) -> list[Array]:
-        tangent: list[Array] = jax.jvp(lambda t: make([*x[:k], t, *x[k + 1 :]]), (x[k],), (jnp.ones_like(x[k]),))[1]
-        return tangent
-
-    return [along(k) for k in range(len(x))], make(x)
 
 
 def polar_tables(problem: Problem, x: Vector) -> _Tables:
@@ -152,14 +139,22 @@ def _values(chart: Chart, own: list[Array], shared: list[Array], tables: _Tables
     return jnp.broadcast_to(chart.model(own, shared).evaluate(at), g.shape)
 
 
-@partial(jax.jit, static_argnums=0)
-def _channel_residual(
-    chart: Chart, y: list[Array], tables: _Tables, measured: Array, g: Geometry, loss: Loss, root: Array
-) -> tuple[Array, Array]:
-    """Weighted residual and BRDF values of one channel."""
-    k = len(chart.channel)
-    f = _values(chart, y[:k], y[k:], tables, g)
-    return root * loss(f[..., None], measured[..., None], g)[..., 0], f
+@jax.jit
+def _residual(loss: Loss, f: Array, measured: Array, g: Geometry, root: Array) -> tuple[Array, Array, Array]:
+    """Weighted residual of one channel's values f, and its first and second derivative by them.
+
+    Taken once for all coordinates, and of T(f) where the residual is T(f) - T(m): its divisions would otherwise be done
+    again for each column of the Jacobian.
+    """
+
+    def residual(f: Array) -> Array:
+        return loss(f[..., None], measured[..., None], g)[..., 0]
+
+    transform = loss.transform
+    by_value = residual if transform is None else (lambda f: transform(f, g))
+    one = jnp.ones_like(f)
+    slope, bend = jax.jvp(lambda f: jax.jvp(by_value, (f,), (one,))[1], (f,), (one,))
+    return root * residual(f), root * slope, root * bend
 
 
 @partial(jax.jit, static_argnums=0)
@@ -189,11 +184,12 @@ def channel_rows(
     root = _root_weight(loss, g, weight)
 
     def one(own_c: Vector, tables_c: _Tables, measured_c: Array) -> tuple[Array, Array]:
-        columns, r, f = _columns(
-            lambda y: _channel_residual(chart, y, tables_c, measured_c, g, loss, root),
-            [*own_c, *shared],
-            [len(own_c) + i for i in twice],
-        )
+        k = len(own_c)
+        at = [k + i for i in twice]
+        slopes, f = _columns(lambda y: _values(chart, y[:k], y[k:], tables_c, g), [*own_c, *shared], at)
+        r, slope, bend = _residual(loss, f, measured_c, g, root)
+        first, second = slopes[: len(slopes) - len(at)], slopes[len(slopes) - len(at) :]
+        columns = [d * slope for d in first] + [d2 * slope + bend * first[i] ** 2 for i, d2 in zip(at, second, strict=True)]
         return jnp.stack([*(jnp.broadcast_to(c, r.shape) for c in columns), r]), f
 
     rows: tuple[Array, Array] = jax.vmap(one, in_axes=(0, 0 if problem.chart.own_lobes else None, 0))(own, tables, measured)
@@ -206,12 +202,12 @@ def joint_rows(
     """As :func:`channel_rows`, of all channels at once, for a loss of any form; m residuals a cell."""
     root = _root_weight(problem.loss, g, weight)
     form = problem.chart, problem.channels
-    columns, r, f = _columns(
+    slopes, (r, f) = _columns(
         lambda y: _joint_residual(form, y, tables, measured, g, problem.loss, root),
         list(x),
         [problem.size - len(problem.chart.shared) + i for i in twice],
     )
-    return jnp.stack([*columns, r]), f
+    return jnp.stack([*(column for column, _ in slopes), r]), f
 
 
 def _products(rows: Float[Array, " m *cells"]) -> Float[Array, "m m"]:
@@ -253,6 +249,14 @@ class Span(eqx.Module):
         return Span(np.asarray(samples.compressed), np.asarray(min(count or samples.blocks, samples.blocks)))
 
     @staticmethod
+    def halves(samples: Samples) -> list[Span]:
+        """All blocks of cells in two spans, for two threads; one where there is one block."""
+        half = samples.blocks - samples.blocks // 2
+        first = np.asarray(samples.compressed)
+        spans = [Span(first, np.asarray(half)), Span(first + half, np.asarray(samples.blocks - half))]
+        return spans if samples.blocks > 1 else spans[:1]
+
+    @staticmethod
     def nodes(samples: Samples, count: int | None = None) -> Span:
         """The first ``count`` compressed blocks; all of them by default."""
         return Span(np.asarray(0), np.asarray(min(count or samples.compressed, samples.compressed)))
@@ -291,7 +295,9 @@ def _gram(problem: Problem, x: Vector, span: Span, twice: tuple[int, ...]) -> Fl
 
     def one(g: Geometry, measured: Array, weight: Array) -> Array:
         if problem.loss.separable:
-            return jax.vmap(_products)(channel_rows(problem, x, tables, g, measured, weight, twice)[0])
+            rows = channel_rows(problem, x, tables, g, measured, weight, twice)[0]
+            # product by product: a product of all channels at once takes several times as long from five rows on
+            return jnp.stack([_products(r) for r in rows])
         return _products(joint_rows(problem, x, tables, g, measured, weight, twice)[0])
 
     total: Array = _sum_over_blocks(problem.samples, span, one)
@@ -304,19 +310,19 @@ def _gram(problem: Problem, x: Vector, span: Span, twice: tuple[int, ...]) -> Fl
 
 
 class Statistics(NamedTuple):
-    """What one pass over all cells at an optimum tells."""
+    """What one pass at an optimum tells; the sum of those of two spans is that of both."""
 
     bands: Float[Array, "... n+1 n+1"]
     """G of each angular band."""
     middle: Float[Array, "n n"]
     """Sum over cells of s s^T, s = sum_c w r J the gradient of a cell: the middle of the sandwich (White 1980, eq. 3). The
     channels of a cell are summed first, so that noise which they share is counted."""
-    errors: Float[Array, " losses"]
-    """sqrt(sum w r^2 / sum w) of each loss asked for."""
+    sums: Float[Array, "losses 2"]
+    """sum w r^2 and sum w of each loss asked for."""
 
 
-def statistics(problem: Problem, x: Float[Any, " n"], losses: tuple[Loss, ...] = ()) -> Statistics:
-    """What error bars are made of, and the error under each loss, over all cells and channels."""
+def statistics(problem: Problem, x: Float[Any, " n"], losses: tuple[Loss, ...], span: Span) -> Statistics:
+    """What error bars are made of, and the error under each loss, over a span of cells and all channels."""
     n, k, c = problem.size, len(problem.chart.channel), problem.channels
     tables = polar_tables(problem, x)
 
@@ -332,9 +338,9 @@ def statistics(problem: Problem, x: Float[Any, " n"], losses: tuple[Loss, ...] =
             bands = jnp.sum(jax.vmap(lambda r: _band_products(r, problem.samples), in_axes=1)(rows), 0)
         return bands, s @ s.T, _loss_sums(losses, f, measured, weight, g)
 
-    bands, middle, sums = _sum_over_blocks(problem.samples, Span.cells(problem.samples), one)
+    bands, middle, sums = _sum_over_blocks(problem.samples, span, one)
     bands = _scatter(problem, bands) if problem.loss.separable else bands
-    return Statistics(bands, middle, jnp.sqrt(sums[:, 0] / sums[:, 1]))
+    return Statistics(bands, middle, sums)
 
 
 def factor(g: Float[Array, "m m"]) -> Float[Array, "m m"]:
@@ -390,13 +396,16 @@ def _loss_sums(
     out = [jnp.zeros((0, 2))]
     for loss in losses:
         relative = loss.weight(g)
-        w = jnp.broadcast_to(weight if relative is None else weight * relative, weight.shape).reshape(-1, 1)
-        p, m = jnp.moveaxis(f, 0, -1), jnp.moveaxis(measured, 0, -1)
-        if loss.separable:
-            r = loss(p, m, g).reshape(w.size, -1)
+        w = jnp.broadcast_to(weight if relative is None else weight * relative, weight.shape)
+        if loss.separable:  # channel by channel, as the values lie in memory
+            each: Any = jax.vmap(lambda p, m, loss=loss: loss(p[..., None], m[..., None], g)[..., 0])
+            r = each(f, measured)
         else:
-            r = jnp.asarray(loss(p.reshape(w.size, -1), m.reshape(w.size, -1), g.flat())).reshape(w.size, -1)
-        out.append(jnp.stack([jnp.sum(w * r**2), jnp.sum(w) * r.shape[-1]])[None])
+            p, m = (jnp.moveaxis(v, 0, -1).reshape(w.size, -1) for v in (f, measured))
+            r = jnp.moveaxis(jnp.asarray(loss(p, m, g.flat())).reshape(*w.shape, -1), -1, 0)
+        # a product, not a sum: the compiler takes the terms of a sum one by one, those of a product in vectors
+        squares = (r**2).reshape(len(r), -1) @ w.reshape(-1)
+        out.append(jnp.stack([jnp.sum(squares), jnp.sum(w) * len(r)])[None])
     return jnp.concatenate(out)
 
 

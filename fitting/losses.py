@@ -104,8 +104,8 @@ def _cuberoot(f: Values, m: Values, g: Geometry) -> Values:
 
 
 def _perceptual(f: Values, m: Values, g: Geometry) -> Values:
-    cosines = (g.cos_i * g.cos_o)[..., None]
-    return _cbrt(f * cosines) - _cbrt(m * cosines)
+    # root by root: those of f cos_i and m cos_i are also those of _cuberoot, and the compiler takes them once
+    return _cuberoot(f, m, g) * _cbrt(g.cos_o)[..., None]
 
 
 def _relative(f: Values, m: Values, g: Geometry) -> Values:
@@ -123,7 +123,7 @@ def _cos_o(g: Geometry) -> Array:
 _LOG = (lambda f, g: jnp.log1p(f * g.cos_i), lambda t, g: jnp.expm1(t) / g.cos_i)
 _NGAN = (lambda f, g: f * g.cos_i, lambda t, g: t / g.cos_i)
 _CUBEROOT = (lambda f, g: _cbrt(f * g.cos_i), lambda t, g: t**3 / g.cos_i)
-_PERCEPTUAL = (lambda f, g: _cbrt(f * (g.cos_i * g.cos_o)), lambda t, g: t**3 / (g.cos_i * g.cos_o))
+_PERCEPTUAL = (lambda f, g: _cbrt(f * g.cos_i) * _cbrt(g.cos_o), lambda t, g: t**3 / (g.cos_i * g.cos_o))
 
 LOSSES: dict[str, Loss] = {
     loss.name: loss

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Iterator
 from dataclasses import dataclass
+from itertools import chain
 from typing import Any, NamedTuple
 
 import equinox as eqx
@@ -16,6 +17,7 @@ from .effort import DEFAULT, Effort
 from .gram import Problem, Span, gram_residual
 from .result import Optimum
 from .solver import Box, Minimum, minimise
+from .threads import in_threads
 
 COLOUR_BLOCKS = (2, 1)
 """Blocks of cells, and compressed blocks, for refitting the linear coordinates alone."""
@@ -28,6 +30,8 @@ SAME = 1e-3
 WORTH = 1.3
 """An optimum of the coarse table is carried on if its cost is below this multiple of the best one's."""
 MAX_STEPS = 300
+RUN = 8
+"""Starts, neighbours in shape, whose colours are fitted one after another; runs go side by side."""
 
 
 class Stage(eqx.Module):
@@ -106,7 +110,7 @@ def search(problems: list[tuple[Problem, Box, list[NDArray[np.float64]]]], effor
             distinct.append(candidate)
             counts.append(1)
     worth = [d for d in distinct[:FINISHED] if d.cost <= WORTH * distinct[0].cost] or distinct[:1]
-    finished = [_candidate(d.problem, d.box, solve(d.problem, d.minimum.x, d.box, whole)) for d in worth]
+    finished = list(in_threads(lambda d: _candidate(d.problem, d.box, solve(d.problem, d.minimum.x, d.box, whole)), worth))
     costs = [c.cost for c in (*finished, *distinct[len(finished) :])]
     optima = [Optimum(float(np.sqrt(cost)), count) for cost, count in zip(costs, counts, strict=True)]
     best = min(finished, key=_cost)
@@ -120,13 +124,26 @@ def _polished(
     """The best starts after a refit of the linear coordinates, polished; of doubles only one."""
     linear = np.asarray([c.linear for c, _ in problem.chart.vector(problem.channels)])
     colours = Box(box.lower, box.upper, box.free & linear)
-    ranked = sorted((_candidate(problem, box, solve(problem, x, colours, colour)) for x in starts), key=_cost)
+
+    def coloured(run: list[NDArray[np.float64]]) -> list[Candidate]:
+        """Starts whose shapes are alike: each begins with the colours of the one before, which are close to its own."""
+        found: list[Candidate] = []
+        for x in run:
+            begin = np.where(colours.free, found[-1].minimum.x, x) if found else x
+            end = _candidate(problem, box, solve(problem, begin, colours, colour))
+            if found and not end.cost < np.inf:  # with those colours this shape has a value that the loss cannot take
+                end = _candidate(problem, box, solve(problem, x, colours, colour))
+            found.append(end)
+        return found
+
+    runs = [starts[i : i + RUN] for i in range(0, len(starts), RUN)]
+    ranked = sorted(chain.from_iterable(in_threads(coloured, runs)), key=_cost)
     kept: list[Candidate] = []
     for c in ranked:
         if len(kept) < count and not (kept and c.cost <= kept[-1].cost * (1 + 1e-9)):
             kept.append(c)
-    for c in kept or ranked[:1]:
-        yield _candidate(problem, box, solve(problem, c.minimum.x, box, coarse))
+    kept = kept or ranked[:1]
+    return in_threads(lambda c: _candidate(problem, box, solve(problem, c.minimum.x, box, coarse)), kept)
 
 
 def _candidate(problem: Problem, box: Box, minimum: Minimum) -> Candidate:

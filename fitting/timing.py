@@ -2,13 +2,11 @@
 
 from __future__ import annotations
 
-import threading
 from collections.abc import Iterator
 from contextlib import contextmanager
+from contextvars import ContextVar
 from dataclasses import dataclass
 from functools import cache
-
-_local = threading.local()
 
 
 @dataclass
@@ -18,12 +16,15 @@ class Compilation:
     seconds: float = 0.0
 
 
+_current: ContextVar[Compilation | None] = ContextVar("compilation", default=None)
+
+
 @cache
 def _listen() -> None:
     import jax.monitoring
 
     def record(event: str, duration_secs: float, **kwargs: str | int) -> None:
-        current: Compilation | None = getattr(_local, "current", None)
+        current = _current.get()
         if current is not None and event.startswith("/jax/core/compile"):
             current.seconds += duration_secs
 
@@ -32,11 +33,11 @@ def _listen() -> None:
 
 @contextmanager
 def compilation() -> Iterator[Compilation]:
-    """Adds up what this thread compiles inside the block."""
+    """Adds up what is compiled inside the block, by this thread and by those that take over its context."""
     _listen()
-    outer = getattr(_local, "current", None)
-    _local.current = Compilation()
+    counted = Compilation()
+    token = _current.set(counted)
     try:
-        yield _local.current
+        yield counted
     finally:
-        _local.current = outer
+        _current.reset(token)

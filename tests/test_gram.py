@@ -68,7 +68,12 @@ def dense_rows(problem: Problem, x):
 def both(problem: Problem, x):
     rows = dense_rows(problem, x)
     jac = jax.jacfwd(lambda y: dense_rows(problem, y))(x)
-    return gram(problem, x, Span.cells(problem.samples)), statistics(problem, x)[:2], rows, jac
+    return (
+        gram(problem, x, Span.cells(problem.samples)),
+        statistics(problem, x, (), Span.cells(problem.samples))[:2],
+        rows,
+        jac,
+    )
 
 
 CASES = [

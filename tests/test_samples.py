@@ -143,7 +143,7 @@ def test_unused_cells_are_harmless():
 
     @eqx.filter_jit
     def passes(problem, x):
-        return gram(problem, x, Span.cells(problem.samples)), statistics(problem, x)[:2]
+        return gram(problem, x, Span.cells(problem.samples)), statistics(problem, x, (), Span.cells(problem.samples))[:2]
 
     with jax.enable_x64(True):
         for garbage in GARBAGE:
