@@ -34,7 +34,6 @@ from .schwenk import Schwenk
 from .sgd import SGD
 from .strauss import Strauss
 from .student_t import StudentT
-from .strauss import Strauss
 from .ward import Ward, WardAnisotropic
 from .ward_bounded import WardBounded, WardBoundedAnisotropic
 from .ward_duer import WardDuer, WardDuerAnisotropic
