@@ -11,6 +11,8 @@ from typing import Any
 
 from mpmath import mp, mpf
 
+from . import microfacets
+
 DIGITS = 40
 DIFFERENCE_DIGITS = 75
 STEP = mpf(10) ** -30
@@ -154,6 +156,101 @@ def schwenk(l: Vector, v: Vector, diffuse: Any, specular: Any, smoothness: Any, 
     return (diffuse + scale * js) / mp.pi
 
 
+def distribution_based(l: Vector, v: Vector, diffuse: Any, specular: Any, f0: Any, **p: Any) -> Any:
+    """Ashikhmin & Premoze (2007), eq. 5, with ln p by de Boor's recursion for a uniform cubic B-spline."""
+    hx, hy, _ = _half(l, v)
+    width2 = mpf(0.002) ** 2  # the float64 number: it is a constant of the model
+    c = [mpf(0), *(p[f"p_{k}"] for k in range(1, 12))]
+    c = [2 * c[0] - c[1], *c, 2 * c[-1] - c[-2]]
+    x = 11 * mp.log(1 + (hx**2 + hy**2) / width2) / mp.log(1 + 1 / width2)
+    k = min(int(mp.floor(x)), 10)
+    f = x - k
+    d = c[k : k + 4]  # those at knots k - 1 to k + 2
+    for degree in (3, 2, 1):
+        d = [((degree - i - f) * d[i] + (f + i) * d[i + 1]) / degree for i in range(degree)]
+    lobe = mp.exp(d[0]) / (l[2] + v[2] - l[2] * v[2])
+    return diffuse / mp.pi + specular * _schlick_fresnel(f0, l, v) * lobe
+
+
+def series(g: Any, t: Any) -> Any:
+    """Sum over m >= 1 of g^m e^-g/(m! m) exp(-t/m), term by term either way from the largest until they are below 1e-45."""
+    top = max(1, int(g))
+    while mp.log(g) - mp.log(top + 1) + t / top**2 > 0:  # far out for t >> g
+        top += max(1, top // 8)
+    smallest = mpf(10) ** (-mp.dps - 5)
+    start = g**top * mp.exp(-g) / mp.factorial(top)
+    total = mpf(0)
+    for step in (1, -1):
+        m, weight, term = top, start, mp.inf
+        while m >= 1:
+            last, term = term, weight / m * mp.exp(-t / m)
+            total += term if step == 1 or m != top else 0
+            if term < smallest * total and term < last:
+                break
+            weight = weight * g / (m + 1) if step == 1 else weight * m / g
+            m += step
+    return total
+
+
+def _cook(ior: Any, c: Any) -> Any:
+    """Cook & Torrance (1982), eq. 3."""
+    g = mp.sqrt(ior**2 + c**2 - 1)
+    ratio = (c * (g + c) - 1) / (c * (g - c) + 1)
+    return (g - c) ** 2 / (g + c) ** 2 / 2 * (1 + ratio**2)
+
+
+def _wave(l: Vector, v: Vector, sigma: Any, tau: Any) -> Any:
+    """G D/(pi n.l n.v) of He et al. (1991), eq. 76 to 78 and 83, lambda = 1: v = k (k_r - k_i), k_i = -l, k_r = v."""
+    k = 2 * mp.pi
+    x, y, z = (k * (a + b) for a, b in zip(l, v, strict=True))
+    g = (k * sigma * (l[2] + v[2])) ** 2
+    d = mp.pi**2 * tau**2 / 4 * series(g, (x * x + y * y) * tau**2 / 4)
+    geometry = ((x * x + y * y + z * z) / z) ** 2 / k**2  # (s.k)^2 + (p.k)^2 = |k_r x k_i|^2 cancels for unpolarised light
+    return geometry * d / (mp.pi * l[2] * v[2])
+
+
+def _smith(c: Any, sigma: Any, tau: Any) -> tuple[Any, Any]:
+    """S of one direction (He et al. 1991, eq. 24) and K (eq. 82), of its cosine."""
+    s = mp.sqrt(1 - c * c)
+    if s < mpf(10) ** -30:
+        return mpf(1), mpf(0)
+    cot = c / s
+    a = tau * cot / (2 * sigma)
+    spread = (2 / mp.sqrt(mp.pi) * sigma / (tau * cot) * mp.exp(-a * a) - mp.erfc(a)) / 2
+    return (1 - mp.erfc(a) / 2) / (spread + 1), mp.erfc(a) / cot
+
+
+def _effective(ki: Any, ko: Any, sigma: Any) -> Any:
+    """sigma of He et al. (1991), eq. 80 and 81: sqrt(pi/2) z = sigma/4 (K_i + K_r) exp(-z^2/(2 sigma^2)), by Newton."""
+    right = (ki + ko) / 4 / mp.sqrt(mp.pi / 2)
+    x = mpf(0) if right == 0 else mp.sqrt(mp.lambertw(right**2).real)
+    return sigma / mp.sqrt(1 + x * x)
+
+
+def htsg(l: Vector, v: Vector, diffuse: Any, specular: Any, ior: Any, sigma: Any, tau: Any) -> Any:
+    """He et al. (1991), eq. 71, without the specular term."""
+    (si, ki), (so, ko) = (_smith(w[2], sigma, tau) for w in (l, v))
+    f = _cook(ior, _dot(l, _half(l, v)))
+    return diffuse / mp.pi + specular * f * si * so * _wave(l, v, _effective(ki, ko, sigma), tau)
+
+
+def htsg_mirror(l: Vector, specular: Any, ior: Any, sigma: Any, tau: Any) -> Any:
+    """The specular term of He et al. (1991), eq. 72, without its delta function."""
+    s, k = _smith(l[2], sigma, tau)
+    g = (4 * mp.pi * _effective(k, k, sigma) * l[2]) ** 2
+    return specular * _cook(ior, l[2]) * mp.exp(-g) * s * s
+
+
+def stam(l: Vector, v: Vector, diffuse: Any, specular: Any, sigma: Any, tau: Any, ior: Any) -> Any:
+    """Stam (1999), eq. 9 and 15: F (1 + l.v)^2/(n.l + n.v)^2/(n.l n.v) times the transform of the surface over its area."""
+    k = 2 * mp.pi
+    g = (k * sigma * (l[2] + v[2])) ** 2
+    u2 = k**2 * ((l[0] + v[0]) ** 2 + (l[1] + v[1]) ** 2)
+    spectrum = mp.pi * tau**2 * series(g, u2 * tau**2 / 4)
+    factor = ((1 + _dot(l, v)) / (l[2] + v[2])) ** 2 / (l[2] * v[2])
+    return diffuse / mp.pi + specular * _cook(ior, _dot(l, _half(l, v))) * factor * spectrum
+
+
 MODELS: dict[str, Callable[..., Any]] = {
     "Phong": phong,
     "ModifiedPhong": modified_phong,
@@ -169,11 +266,17 @@ MODELS: dict[str, Callable[..., Any]] = {
     "SchlickTwoLayers": schlick_two_layers,
     "Strauss": strauss,
     "Schwenk": schwenk,
+    "DistributionBased": distribution_based,
+    "HTSG": htsg,
+    "StamDiffraction": stam,
+    **microfacets.MODELS,
 }
 """By the name of the class under test: functions of unit vectors and parameters."""
 
 
 def _at(name: str, wi: Vector, wo: Vector, numbers: dict[str, Any]) -> Any:
+    if name in microfacets.MODELS:  # defined off the unit sphere too, by l + v and l - v
+        return MODELS[name](wi, wo, **numbers)
     return MODELS[name](_unit(wi), _unit(wo), **numbers)
 
 

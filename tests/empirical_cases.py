@@ -39,8 +39,8 @@ class Row:
     """Relative error of the value."""
     energy: tuple[Case, ...] = ()
     """Cases whose albedo must not exceed 1."""
-    truth: Case = field(default_factory=dict)
-    """Shape of a synthetic material that is fitted."""
+    truth: Case | None = field(default_factory=dict)
+    """Shape of a synthetic material that is fitted; None if none is."""
 
     @property
     def name(self) -> str:
@@ -53,9 +53,9 @@ class Row:
         return self.model(**{p.name: columns[p.name][:, None] if p.per_channel else columns[p.name] for p in specs})
 
 
-def row(name: str, base: Case, *changes: Case, **options: Any) -> Row:
+def row(name: str, base: Case, *changes: Case, form: int = 0, **options: Any) -> Row:
     """``base`` and its changes, filled up with random draws from the search boxes."""
-    model = models.MODELS[name][0]
+    model = models.MODELS[name][form]
     cases = [{**base, **c} for c in ({}, *changes)]
     rng = np.random.default_rng(11)
     while len(cases) < PARAMETER_SETS:
@@ -96,6 +96,19 @@ LAYERS = {"specular": 0.04, "base": 0.3, "roughness": 0.02, "base_roughness": 0.
 PLASTIC = {"diffuse": 0.4, "smoothness": 0.6, "metalness": 0.3, "transparency": 0.1}
 SMOOTH = [{"smoothness": s} for s in (0.0, 0.9, 0.999)] + [{"metalness": 1.0, "transparency": 0.0}, {"transparency": 0.9}]
 GLOSSY = {"diffuse": 0.1, "specular": 0.5, "smoothness": 0.7, "scale": 1.0}
+TABULATED = {p.name: p.default for p in parameters_of(models.MODELS["distribution_based"][0])} | {"diffuse": 0.1}
+WAVES = {"diffuse": 0.1, "specular": 0.5, "ior": 1.5, "sigma": 0.15, "tau": 1.5}
+SURFACES = [
+    (1e-3, 0.05),
+    (1e-3, 200.0),
+    (0.05, 3.0),
+    (0.3, 1.0),
+    (0.6, 0.8),
+    (0.6, 20.0),
+    (0.62, 2.0),
+    (1.2, 9.0),
+    (2.5, 60.0),
+]
 
 EMPIRICAL: tuple[Row, ...] = (
     row("phong", LOBE, *EXPONENTS, reciprocal=False, truth={"exponent": 40.0}),
@@ -112,4 +125,7 @@ EMPIRICAL: tuple[Row, ...] = (
     row("schlick_two_layers", LAYERS, {"roughness": 1e-9}, {"base_roughness": 1.0, "specular": 0.0}, {"specular": 1.0}),
     row("strauss", PLASTIC, *SMOOTH, reciprocal=False, kink=NORMAL, tolerance=1e-9),  # angles of 1e-8 are lost in the cosine
     row("schwenk", GLOSSY, {"smoothness": 0.0}, {"smoothness": 1.0, "diffuse": 0.0}, {"specular": 0.0}, {"scale": 0.0}),
+    row("distribution_based", TABULATED, {"f0": 1.0}, {"p_3": -20.0}, {"p_1": 3.0, "p_2": 3.0}, truth={"f0": 0.2}),
+    row("htsg", WAVES, *({"sigma": s, "tau": t} for s, t in SURFACES), {"ior": 1.0}, {"ior": 20.0}),
+    row("stam_diffraction", WAVES, *({"sigma": s, "tau": t} for s, t in SURFACES), {"ior": 20.0}),
 )
