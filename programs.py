@@ -10,6 +10,7 @@ from typing import Any, ParamSpec, TypeVar
 
 import equinox as eqx
 import jax
+import jax.numpy as jnp
 
 P = ParamSpec("P")
 R = TypeVar("R")
@@ -56,7 +57,7 @@ def _kind(arguments: Any) -> Hashable:
     """What a program is compiled for: shapes and types of arrays, and all else as it is."""
     leaves, structure = jax.tree.flatten(arguments)
     kinds = ((x.shape, x.dtype) if hasattr(x, "dtype") else x for x in leaves)
-    return structure, *kinds, jax.config.read("jax_enable_x64")
+    return structure, *kinds, jnp.result_type(float)
 
 
 @cache

@@ -27,6 +27,7 @@ from .samples import Samples, compress, samples
 from .search import Found, Stage, search, solve
 from .solver import Box, Minimum
 from .starts import Summary, starts, summarise
+from .threads import in_threads
 from .timing import compilation
 
 Model = str | BRDF | type[BRDF]
@@ -76,11 +77,12 @@ def prepare(
         kept = _prepared.setdefault(table, {})
         if key not in kept:
             cells, used = samples(table, max_angle, measure, effort.nodes)
+            aside = in_threads(lambda t: summarise(t, used), [table])
             values = table.planes[:, used]
             bound = loss.bind(values)
             kept.clear()
             both = compress(cells, table, used, max_angle, bound) if compressed else cells
-            kept[key] = Prepared(both, used, summarise(table, used), bound, _named_losses(values, bound))
+            kept[key] = Prepared(both, used, next(aside), bound, _named_losses(values, bound))
         return kept[key]
 
 

@@ -23,6 +23,7 @@ from ..polar import PolarStencil
 from ..tables import HalfDifferenceGrid, Table
 from .compression import row_rules
 from .losses import Loss
+from .threads import in_threads
 
 Reals = NDArray[np.float64]
 
@@ -200,7 +201,8 @@ def compress(whole: Samples, table: Table, used: NDArray[np.bool_], max_angle: f
     The same samples where that is not possible: scattered samples, short rows, losses without a transform.
     """
     grid = table.layout
-    if loss.transform is None or loss.inverse is None or not isinstance(grid, HalfDifferenceGrid) or not grid.isotropic:
+    transform = loss.transform
+    if transform is None or loss.inverse is None or not isinstance(grid, HalfDifferenceGrid) or not grid.isotropic:
         return whole
     limit = float(np.radians(max_angle))
     k = whole.banded[3]
@@ -216,17 +218,21 @@ def compress(whole: Samples, table: Table, used: NDArray[np.bool_], max_angle: f
         relative = loss.weight(g)
         weight[at] *= 1.0 if relative is None else np.asarray(relative)
     rules = row_rules(np.where(grid.phi_d > np.pi, 2 * np.pi - grid.phi_d, grid.phi_d), weight, k)
-    reduced = np.empty((table.channels, *rules.phi.shape))
-    remainder = np.zeros(table.channels)
-    for at, g in zip(chunks, geometries, strict=True):
+
+    def reduced(chunk: tuple[slice, Geometry]) -> tuple[Reals, Reals]:
+        """Values at the nodes of some rows, and the square sum that they leave out."""
+        at, g = chunk
         part = np.ix_(rows[0][at], rows[1])
         planes = np.stack([np.where(used[part], plane[part], 0.0) for plane in table.planes])
-        transformed = np.asarray(loss.transform(jnp.asarray(planes), g))
-        reduced[:, at], kept = rules.compress(transformed, at)
-        remainder += np.einsum("hdp,chdp,chdp->c", weight[at], transformed, transformed) - kept
+        transformed = np.asarray(transform(jnp.asarray(planes), g))
+        values, kept = rules.compress(transformed, at)
+        return values, np.einsum("hdp,chdp,chdp->c", weight[at], transformed, transformed) - kept
+
+    parts = list(in_threads(reduced, list(zip(chunks, geometries, strict=True))))
+    remainder = np.sum([left_out for _, left_out in parts], 0)
     node_weight = rules.weight
     at_nodes = _plain_geometry(h, d, rules.phi, node_weight > 0)
-    values = np.asarray(loss.inverse(jnp.asarray(reduced), at_nodes))
+    values = np.asarray(loss.inverse(jnp.asarray(np.concatenate([values for values, _ in parts], 1)), at_nodes))
     relative = loss.weight(at_nodes)
     node_weight = node_weight if relative is None else node_weight / np.asarray(relative)
     nodes = _Fold((*(len(r) for r in rows), k), k)
