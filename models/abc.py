@@ -22,7 +22,8 @@ class ABC(BRDF):
     """f = diffuse/pi + specular F_dielectric(ior, c_d) D_abc G_vcavity / (4 n.l n.v) (Low et al. 2012, eq. 15).
 
     Low et al. leave D unnormalised and divide by pi; here D is normalised, so that specular is a scale near 1.
-    Reciprocal; energy is not bounded by the form, since specular and ior both scale the lobe.
+    Reciprocal. The albedo is at most diffuse + specular, and specular is not bounded. Published fits return at most 0.69 at
+    88 degrees (tests/test_energy.py::test_published_fits_of_abc).
     Known failures: specular and ior trade off along a ridge; the derivative in ior nearly vanishes at ior 7.6 to 11, and
     most materials have a second optimum at ior -> infinity.
     """

@@ -35,7 +35,8 @@ class AshikhminShirley(BRDF):
     """f = 28 diffuse/(23 pi) (1 - specular)(1 - (1 - n.v/2)^5)(1 - (1 - n.l/2)^5)
     + (e + 1)/(8 pi) (n.h)^e F_schlick(specular, c_d) / (c_d max(n.l, n.v)) (Ashikhmin & Shirley 2000, eq. 4 and 5).
 
-    Reciprocal; conserves energy for diffuse, specular <= 1. Known failure: on rough materials the best fit uses the lobe
+    Reciprocal; conserves energy for diffuse, specular <= 1 (tests/test_energy.py::test_ashikhmin_shirley_conserves_energy).
+    Known failure: on rough materials the best fit uses the lobe
     (exponent -> 0) as body term.
     """
 

@@ -19,7 +19,8 @@ from .microfacet import microfacet
 class GTR(BRDF):
     """f = diffuse/pi + F_schlick(specular, c_d) D_gtr G / (4 n.l n.v), G height-correlated Smith of D_gtr itself.
 
-    Reciprocal. The lobe conserves energy for specular <= 1; the sum need not (the body term ignores the lobe).
+    Reciprocal. The albedo of the lobe is at most 1 for specular <= 1; that of the sum is at most diffuse + 1, since the body
+    term ignores the lobe, and reaches it at grazing on smooth surfaces (tests/test_energy.py::test_gtr_on_top_of_its_body).
     Known failures: as alpha -> 0 the lobe becomes a power law in which alpha only scales specular against the grazing
     term (a ridge); as gamma -> infinity only gamma (1/alpha^2 - 1) is determined.
     """
