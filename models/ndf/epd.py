@@ -7,6 +7,8 @@ import jax
 import jax.numpy as jnp
 from jaxtyping import Array, Float
 
+from .power_cosine import log_cosine
+
 _GONE = 7.0
 """ln of an exponent: exp(-e^7) is 0 in double precision."""
 
@@ -32,12 +34,12 @@ class EPD(eqx.Module):
         reach = jnp.exp(jnp.minimum(_GONE / p, 80 if single else 600))
         lost = sin2 / reach > alpha**2 * cos2
         aside = peak | lost
-        sin2, cos2_h = jnp.where(aside, 0.5, sin2), jnp.where(aside, 0.5, cos2)
-        log = jnp.log(sin2 / cos2_h) - 2 * jnp.log(self.alpha)
-        half = jnp.exp(jnp.where(aside, 0, -jnp.exp(self.p * jnp.where(aside, 0, log)) / 2))
+        log = jnp.log(jnp.where(aside, 1, sin2)) - jnp.log(jnp.where(aside, 1, cos2)) - 2 * jnp.log(self.alpha)
+        fall = jnp.where(peak, 0, jnp.exp(self.p * jnp.where(aside, 0, log)))
+        # 1/cos^4 within the exponential: float32 cannot hold it where the tail goes on to the horizon
+        half = jnp.exp(-fall / 2 - 2 * log_cosine(jnp.where(lost, 0.5, sin2), jnp.where(lost, 0.5, cos2)))
         k = jnp.exp(-jax.lax.lgamma(1 + 1 / self.p)) / (jnp.pi * self.alpha**2)
-        cos2 = jnp.where(lost, 1, cos2)
-        return jnp.where(lost, 0, k * half / cos2**2 * half)
+        return jnp.where(lost, 0, k * half * half)
 
 
 __all__ = ["EPD"]

@@ -3,13 +3,25 @@
 from __future__ import annotations
 
 import equinox as eqx
-import jax
 import jax.numpy as jnp
 import numpy as np
 from jaxtyping import Array, Float
 
 from ...quadrature import gauss_legendre
 from .power_cosine import log_cosine
+
+_RATIO = (1, -1 / 8, 1 / 128, 5 / 1024, -21 / 32768, -399 / 262144, 869 / 4194304, 39325 / 33554432, -334477 / 2147483648)
+"""Gamma(x + 1/2)/(Gamma(x) sqrt(x)) in powers of 1/x: from x = 24 on the first one left out is below 1e-15."""
+
+
+def gamma_ratio(w: Float[Array, ""]) -> Float[Array, ""]:
+    """Gamma(w + 1/2)/Gamma(w), w > 0, which the difference of their logarithms has not to all digits."""
+    x = w + 24
+    series = jnp.full_like(x, _RATIO[-1])
+    for c in reversed(_RATIO[:-1]):
+        series = series / x + c
+    below = w + jnp.arange(24, dtype=x.dtype)
+    return jnp.prod(below / (below + 0.5)) * jnp.sqrt(x) * series
 
 
 class StudentT(eqx.Module):
@@ -49,7 +61,7 @@ class StudentT(eqx.Module):
         # (tests/test_masking.py::test_closed_forms).
         sine = jnp.sqrt((1 - cosine) * (1 + cosine) + (1e-12 if cosine.dtype == jnp.float32 else 1e-30))
         z0 = cosine / (scale * sine)
-        k = jnp.exp(jax.lax.lgamma(w + 0.5) - jax.lax.lgamma(w)) / jnp.sqrt(jnp.pi)
+        k = gamma_ratio(w) / jnp.sqrt(jnp.pi)
         steep = z0 < 3
         log = jnp.log1p(z0 * z0)
         x, weight = (jnp.asarray(a, jnp.result_type(z0)) for a in gauss_legendre(48))
