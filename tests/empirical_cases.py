@@ -23,7 +23,7 @@ AWAY = np.abs(2 * WI[:, 2] * WO[:, 2] - (WI * WO).sum(-1)) > 1e-12
 WI, WO = WI[AWAY], WO[AWAY]
 
 SLOPES = np.array([0, 3, 12, 14, 20, 27, 33, 36, -4, -2])
-"""Directions whose derivatives have an oracle, five for each case in turn."""
+"""Directions whose derivatives have an oracle, five for each case in turn, or two where the oracle is a series."""
 
 
 @dataclass(frozen=True)
@@ -35,6 +35,8 @@ class Row:
     reciprocal: bool = True
     kink: Any = None
     """Mask ``[n]`` of directions without derivative."""
+    series: bool = False
+    """Whether the oracle is a series, and slow."""
     tolerance: float = 1e-11
     """Relative error of the value."""
     energy: tuple[Case, ...] = ()
@@ -125,7 +127,17 @@ EMPIRICAL: tuple[Row, ...] = (
     row("schlick_two_layers", LAYERS, {"roughness": 1e-9}, {"base_roughness": 1.0, "specular": 0.0}, {"specular": 1.0}),
     row("strauss", PLASTIC, *SMOOTH, reciprocal=False, kink=NORMAL, tolerance=1e-9),  # angles of 1e-8 are lost in the cosine
     row("schwenk", GLOSSY, {"smoothness": 0.0}, {"smoothness": 1.0, "diffuse": 0.0}, {"specular": 0.0}, {"scale": 0.0}),
-    row("distribution_based", TABULATED, {"f0": 1.0}, {"p_3": -20.0}, {"p_1": 3.0, "p_2": 3.0}, truth={"f0": 0.2}),
-    row("htsg", WAVES, *({"sigma": s, "tau": t} for s, t in SURFACES), {"ior": 1.0}, {"ior": 20.0}),
-    row("stam_diffraction", WAVES, *({"sigma": s, "tau": t} for s, t in SURFACES), {"ior": 20.0}),
+    row("distribution_based", TABULATED, {"f0": 1.0}, {"p_3": -20.0}, {"p_1": 3.0, "p_2": 3.0}, grid=(48, 8, 6)),
+    row(
+        "htsg",
+        WAVES,
+        *({"sigma": s, "tau": t} for s, t in SURFACES),
+        {"ior": 1.0},
+        {"ior": 20.0},
+        series=True,
+        grid=(9, 7, 6),
+    ),
+    row(
+        "stam_diffraction", WAVES, *({"sigma": s, "tau": t} for s, t in SURFACES), {"ior": 20.0}, series=True, grid=(9, 7, 6)
+    ),
 )
