@@ -59,8 +59,8 @@ def test_lobes_with_masking(name: str):
 
 def test_gtr_on_top_of_its_body():
     """The body term ignores the lobe, which reaches 1 where a smooth surface is seen at a grazing angle."""
-    found = albedo(MODELS["gtr"][0], 89.995, (64, 32), diffuse=0.0, specular=0.04, alpha=np.array([1e-7]), gamma=2.0)
-    assert found[0] == pytest.approx(1, abs=1e-3)  # Schlick's (1 - cos)^5 is 4e-4 below 1 there
+    found = albedo(MODELS["gtr"][0], 89.995, (64, 32), diffuse=0.0, specular=0.04, alpha=np.array([1e-5]), gamma=2.0)
+    assert 0.99 < found[0] <= 1  # alpha tan(theta) is 0.1: masking still counts a little
 
 
 def test_ashikhmin_shirley_conserves_energy():

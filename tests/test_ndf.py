@@ -92,6 +92,22 @@ def test_sgd_slopes_in_single_precision():
     np.testing.assert_allclose(slopes(np.float32), want, rtol=1e-3)
 
 
+@pytest.mark.parametrize("density", [ndf.GTR, ndf.SGD])
+def test_tails_in_single_precision(density: type):
+    """e^-110 of a peak of 3e14 is a value that float32 holds, though e^-110 is not."""
+    point = np.array([1e-7, 10.0, 6e-10], np.float32)
+
+    def value(dtype: type) -> float:
+        with jax.enable_x64(dtype is np.float64):
+            v = jnp.asarray(point.astype(dtype))
+            return float(density(v[0], v[1])(v[2], 1 - v[2]))
+
+    want = value(np.float64)
+    assert 1e-35 < want < 1e-32
+    # half an ulp of an exponent of 110 is 4e-6, of which a few
+    assert value(np.float32) == pytest.approx(want, rel=1e-4, abs=0)
+
+
 def test_power_cosine_at_both_ends():
     """Gradient and Hessian are finite where sin^2 is 0 and where it rounds to 1, and the power is right beside them."""
     with jax.enable_x64(True):

@@ -49,7 +49,9 @@ class GTR(eqx.Module):
         # Guard: a reciprocal, because the derivative of a quotient a/b forms a db, 1e43 here, beyond float32
         # (tests/test_stability.py::test_random_draws_are_finite).
         k = expm1_ratio(m) * (1 / (jnp.pi * expm1_ratio((1 - self.gamma) * m)))
-        half = jnp.exp(-self.gamma / 2 * jnp.log1p(w * u))  # k may be 1e25 where exp is below float32
+        # Guard: k may be 1e25 where exp is below float32, and its root is not
+        # (tests/test_ndf.py::test_tails_in_single_precision).
+        half = jnp.exp(-self.gamma / 2 * jnp.log1p(w * u))
         return k * half * half
 
     def cumulative(

@@ -64,7 +64,9 @@ class SGD(eqx.Module):
         # what the rounding of 1 + small leaves out, which p multiplies
         rest = jnp.where(ratio > 0.5, (((self.alpha - m) + tail) / m - (ratio - 1)) / ratio, 0)
         log_ratio = jnp.log(ratio) + jax.lax.stop_gradient(rest)
-        half = jnp.exp(((m - self.alpha) - tail - self.p * log_ratio) / 2)  # k may be 1e25 where exp is below float32
+        # Guard: k may be 1e25 where exp is below float32, and its root is not
+        # (tests/test_ndf.py::test_tails_in_single_precision).
+        half = jnp.exp(((m - self.alpha) - tail - self.p * log_ratio) / 2)
         return jnp.where(lost, 0, k * half * half / cos2**2)
 
 
