@@ -87,7 +87,8 @@ class BoxDescent(optx.AbstractDescent[Any, Any, Any]):
     def step(self, step_size: Array, state: _State) -> tuple[Vector, Any]:
         """Step for damping ``damping``/step_size."""
         diagonal = jnp.diag(state.matrix)
-        # Guard: a parameter without any effect has a zero column; it gets scale 1 and stays where it is.
+        # Guard: a parameter without any effect has a zero column; it gets scale 1 and stays where it is
+        # (tests/test_solver.py::test_a_parameter_without_effect_stays).
         scale = jnp.sqrt(jnp.where(diagonal > 0, diagonal, 1.0))
         damping = jnp.maximum(self.damping / step_size, 1e-13)
         gradient = state.gradient / scale
