@@ -15,6 +15,7 @@ parts on their own axes and let them broadcast.
 from __future__ import annotations
 
 from collections.abc import Callable
+from dataclasses import replace
 
 import equinox as eqx
 import jax.numpy as jnp
@@ -51,6 +52,10 @@ class Geometry(eqx.Module):
     slope_x2: Field | None = None
     """h_x^2/h_z^2; None to form it of h_x2 and cos_h, which between grazing directions depend on each other."""
     slope_y2: Field | None = None
+
+    light: Float[Array, "... 3"] | None = None
+    """Unit vector to the light; None on isotropic tables."""
+    viewer: Float[Array, "... 3"] | None = None
 
     tables: PolarTables | None = eqx.field(static=True, default=None)
     """Tables of polar angles made beforehand; None to make them where they are asked for."""
@@ -117,6 +122,16 @@ class Geometry(eqx.Module):
         """
         return self.cos_d**2 * self.sin2_h - self.sin2_d + (self.cos_i - self.cos_o) ** 2 / 4
 
+    @property
+    def tangential_distance2(self) -> Field:
+        """(l_x - v_x)^2 + (l_y - v_y)^2.
+
+        Without the directions themselves it is 4 sin^2(theta_d) - (n.l - n.v)^2, which cancels where both graze the surface.
+        """
+        if self.light is None or self.viewer is None:
+            return 4 * self.sin2_d - (self.cos_i - self.cos_o) ** 2
+        return (self.light[..., 0] - self.viewer[..., 0]) ** 2 + (self.light[..., 1] - self.viewer[..., 1]) ** 2
+
     def at_polar(self, function: Callable[[Field], Field]) -> tuple[Field, Field]:
         """``function(cos(theta))`` at theta_i and theta_o: through the table of polar angles where there is one."""
         if self.stencil_i is None or self.stencil_o is None:
@@ -143,7 +158,7 @@ class Geometry(eqx.Module):
         return x2 * over, y2 * over
 
     def flat(self) -> Geometry:
-        """The same geometry with every field broadcast and flattened to ``[n]``; stencils and slopes are left out."""
+        """The same geometry with every field broadcast and flattened to ``[n]``, without stencils, slopes and directions."""
         shape = self.shape
         fields = (self.cos_i, self.cos_o, self.cos_h, self.sin2_h, self.cos_d, self.sin2_d, self.h_x2, self.h_y2)
         return Geometry(*(None if f is None else jnp.broadcast_to(f, shape).reshape(-1) for f in fields))  # type: ignore[arg-type]
@@ -153,7 +168,7 @@ def from_directions(wi: ArrayLike, wo: ArrayLike) -> Geometry:
     """Geometry of unit vectors ``[..., 3]`` to light and viewer, in the precision they come in."""
     wi, wo = jnp.asarray(wi), jnp.asarray(wo)
     wi, wo = jnp.broadcast_arrays(wi, wo)
-    return from_sums(wi + wo, wi - wo, wi[..., 2], wo[..., 2])
+    return replace(from_sums(wi + wo, wi - wo, wi[..., 2], wo[..., 2]), light=wi, viewer=wo)
 
 
 def from_sums(total: Array, difference: Array, cos_i: Array, cos_o: Array) -> Geometry:

@@ -76,6 +76,11 @@ REFERENCES: dict[str, str] = {
     "and diffraction. ACM Transactions on Graphics 36(4), 66:1-66:12. doi:10.1145/3072959.3073621",
     "ribardiere2017": "Ribardière, M., Bringier, B., Meneveaux, D., Simonot, L. (2017). STD: Student's t-distribution of "
     "slopes for microfacet based BSDFs. Computer Graphics Forum 36(2), 421-429. doi:10.1111/cgf.13137",
+    "kulla2017": "Kulla, C., Conty, A. (2017). Revisiting physically based shading at Imageworks. In Physically Based "
+    "Shading in Theory and Practice, ACM SIGGRAPH 2017 Courses. doi:10.1145/3084873.3084893",
+    "belcour2014": "Belcour, L., Pacanowski, R., Delahaie, M., Laville-Geay, A., Eupherte, L. (2014). Bidirectional "
+    "reflectance distribution function measurements and analysis of retroreflecting materials. Journal of the Optical "
+    "Society of America A 31(12), 2561-2572. doi:10.1364/JOSAA.31.002561",
     # data and coordinates
     "merl": "Matusik, W., Pfister, H., Brand, M., McMillan, L. (2003). A data-driven reflectance model. ACM "
     "Transactions on Graphics 22(3), 759-769. doi:10.1145/882262.882343",

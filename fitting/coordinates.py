@@ -19,7 +19,7 @@ from ..models import BRDF, parameters_of
 from ..models.abc import ABC
 from ..models.ashikhmin_shirley import AshikhminShirley, AshikhminShirleyAnisotropic
 from ..models.fresnel import dielectric_f0
-from ..models.gtr import GTR
+from ..models.parts import Composition
 from ..models.sgd import SGD
 
 Scalars = dict[str, Array]
@@ -145,30 +145,60 @@ def _rewritten(chart: Chart, to_parameters: Map, from_parameters: Map, **boxes: 
     return Chart(chart.cls, coordinates, to_parameters, from_parameters)
 
 
-def _gtr_chart(narrow: bool) -> Chart:
-    """Alpha by the logarithm of |ln alpha^2|, on either side of 1.
+def _composed_chart(cls: type[Composition], narrow: bool = True) -> Chart:
+    """Of a composition of effects: those of its tail and its trade-off, where it has them."""
+    chart = plain_chart(cls)
+    # A refit of the colours settles these too, though the BRDF is affine in them only while others are held.
+    coordinates = tuple(
+        replace(c, linear=c.linear or c.name in ("scatter", "specular", "specular_2")) for c in chart.coordinates
+    )
+    chart = replace(chart, coordinates=coordinates)
+    if {"alpha", "gamma"} <= {c.name for c in coordinates}:
+        chart = _with_tail(chart, narrow)
+    return _with_trade_off(chart, "second_lobe" in cls.effects) if "trade_off" in cls.effects else chart
+
+
+def _with_tail(chart: Chart, narrow: bool) -> Chart:
+    """Alpha of GTR by the logarithm of |ln alpha^2|, on either side of 1.
 
     As gamma -> infinity only K = gamma |ln alpha^2| is determined. In (ln alpha, ln gamma) that valley bends
     exponentially (condition 1e7 to 1e9); in (ln |ln alpha^2|, ln gamma) it is a straight line.
     """
-    plain = plain_chart(GTR)
     sign = -0.5 if narrow else 0.5
     limit = abs(2 * np.log(1e-9 if narrow else 10.0))
 
     def to_parameters(x: Scalars) -> Scalars:
-        return {**x, "alpha": jnp.exp(sign * jnp.exp(x["alpha"])), "gamma": jnp.exp(x["gamma"])}
+        p = chart.to_parameters(x)
+        return {**p, "alpha": jnp.exp(sign * p["alpha"])}
 
     def from_parameters(p: Scalars) -> Scalars:
         # on the wrong side of 1 the nearest point of this chart is its end at 1
         size = jnp.maximum(jnp.log(p["alpha"]) / sign, 1e-9)
-        return {**p, "alpha": jnp.log(size), "gamma": jnp.log(p["gamma"])}
+        return chart.from_parameters({**p, "alpha": size})
 
     def flat(x: dict[str, float]) -> bool:
         """Whether D is all but constant, K < 0.1: what lies beyond has alpha on the other side of 1."""
         return bool(x["alpha"] + x["gamma"] < np.log(0.1))
 
     box = (float(np.log(1e-9)), float(np.log(limit)))
-    return replace(_rewritten(plain, to_parameters, from_parameters, alpha=box), end=flat)
+    tailed = _rewritten(chart, to_parameters, from_parameters, alpha=box)
+    return tailed if tailed.own_lobes else replace(tailed, end=flat)
+
+
+def _with_trade_off(chart: Chart, second: bool) -> Chart:
+    """Diffuse times what the lobes leave of it in place of diffuse, which is not determined as they leave nothing."""
+
+    def left(p: Scalars) -> Array:
+        return (1 - p["specular"]) * (1 - p["specular_2"]) if second else 1 - p["specular"]
+
+    def to_parameters(x: Scalars) -> Scalars:
+        p = chart.to_parameters(x)
+        return {**p, "diffuse": p["diffuse"] / left(p)}
+
+    def from_parameters(p: Scalars) -> Scalars:
+        return chart.from_parameters({**p, "diffuse": p["diffuse"] * left(p)})
+
+    return _rewritten(chart, to_parameters, from_parameters)
 
 
 def _abc_chart() -> Chart:
@@ -222,20 +252,6 @@ def _sgd_chart() -> Chart:
     return _rewritten(plain, to_parameters, from_parameters, specular=(1e-10, float("inf")))
 
 
-def _ashikhmin_shirley_chart(cls: type[BRDF]) -> Chart:
-    """Diffuse (1 - specular) in place of diffuse, which is not determined as specular -> 1; the BRDF is affine in it."""
-    plain = plain_chart(cls)
-
-    def to_parameters(x: Scalars) -> Scalars:
-        p = plain.to_parameters(x)
-        return {**p, "diffuse": x["diffuse"] / (1 - x["specular"])}
-
-    def from_parameters(p: Scalars) -> Scalars:
-        return {**plain.from_parameters(p), "diffuse": p["diffuse"] * (1 - p["specular"])}
-
-    return _rewritten(plain, to_parameters, from_parameters)
-
-
 @lru_cache(maxsize=256)
 def charts(cls: type[BRDF], plain: bool = False, bounds: tuple[tuple[str, float, float], ...] = ()) -> tuple[Chart, ...]:
     """The charts a fit of ``cls`` searches in, cached so that a second fit finds its program compiled.
@@ -243,12 +259,13 @@ def charts(cls: type[BRDF], plain: bool = False, bounds: tuple[tuple[str, float,
     ``plain`` asks for one coordinate a parameter, which held or bounded parameters need.
     """
     if not plain and not bounds:
-        if cls is GTR:
-            return (_gtr_chart(narrow=True), _gtr_chart(narrow=False))
+        if issubclass(cls, Composition) and cls.effects:
+            chart = _composed_chart(cls)
+            return (chart, _composed_chart(cls, narrow=False)) if chart.end else (chart,)
         if cls is ABC:
             return (_abc_chart(),)
         if cls is SGD:
             return (_sgd_chart(),)
         if cls in (AshikhminShirley, AshikhminShirleyAnisotropic):
-            return (_ashikhmin_shirley_chart(cls),)
+            return (_with_trade_off(plain_chart(cls), second=False),)
     return (plain_chart(cls, bounds),)

@@ -7,6 +7,7 @@ on theta_h alone is evaluated once for each theta_h.
 
 from __future__ import annotations
 
+from dataclasses import replace
 from functools import lru_cache
 from typing import Any
 
@@ -301,7 +302,7 @@ def _scattered_samples(table: Table, used: NDArray[np.bool_], weight: Reals, lim
     wi, wo = (np.where(fitted[..., None], v[slots], normal) for v in (wi, wo))
     g: Any = from_directions(wi, wo)
     if table.isotropic:
-        g = eqx.tree_at(lambda q: (q.h_x2, q.h_y2), g, (None, None), is_leaf=lambda x: x is None)
+        g = replace(g, h_x2=None, h_y2=None, light=None, viewer=None)
     stencils = [PolarStencil.of(v[..., 2], limit) for v in (wi, wo)]
     g = eqx.tree_at(lambda q: (q.stencil_i, q.stencil_o), g, tuple(stencils), is_leaf=lambda x: x is None)
     measured = np.moveaxis(np.where(fitted, values[:, slots], 0.0), 0, 1)

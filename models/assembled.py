@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Callable, Mapping
 from contextlib import suppress
 from dataclasses import Field
-from functools import lru_cache
+from functools import cache
 from types import new_class
 from typing import Any
 
@@ -40,7 +40,7 @@ def assemble(
     return _assembled(name, specs, evaluate, doc, references, anisotropic, base, extra)
 
 
-@lru_cache(maxsize=None)
+@cache
 def _assembled(
     name: str,
     specs: tuple[tuple[str, Parameter], ...],

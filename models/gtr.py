@@ -6,17 +6,14 @@ from typing import ClassVar
 
 from jaxtyping import Array, Float
 
-from ..geometry import Geometry
 from . import ndf
-from .base import BRDF, NOT_NEGATIVE, POSITIVE, parameter
+from .base import NOT_NEGATIVE, POSITIVE, parameter
 from .common import diffuse_parameter
-from .diffuse import lambert
-from .fresnel import schlick
-from .masking import smith_correlated
-from .microfacet import microfacet
+from .effects import parts_of
+from .parts import Composition, Parts
 
 
-class GTR(BRDF):
+class GTR(Composition):
     """f = diffuse/pi + F_schlick(specular, c_d) D_gtr G / (4 n.l n.v), G height-correlated Smith of D_gtr itself.
 
     Reciprocal. The albedo of the lobe is at most 1 for specular <= 1; that of the sum is at most diffuse + 1, since the body
@@ -37,13 +34,10 @@ class GTR(BRDF):
         "fall-off of the tail (2: GGX, 1: Berry)", valid=POSITIVE, search=(0.01, 1e7), default=2, log=True
     )
 
+    effects: ClassVar[tuple[str, ...]] = ("body", "lobe", "tail", "fresnel", "masking")
+    parts: ClassVar[Parts] = parts_of(*effects)
+
     @classmethod
     def shapes(cls, half_width: float) -> list[dict[str, float]]:
         """Those of the lobe."""
         return ndf.GTR.shapes(half_width)
-
-    def evaluate(self, g: Geometry) -> Float[Array, "..."]:
-        """Value in 1/sr."""
-        lobe = ndf.GTR(self.alpha, self.gamma)
-        f = schlick(self.specular, g)
-        return lambert(self.diffuse) + microfacet(lobe(g.sin2_h, g.cos2_h), f, smith_correlated(lobe, g))

@@ -13,6 +13,7 @@ from .base import BRDF
 from .diffuse import lambert
 from .masking.smith import NDF
 from .microfacet import microfacet
+from .ndf.stretched import Stretched
 
 Field = Float[Array, "..."]
 Term = Callable[[Any, Geometry], Field]
@@ -26,6 +27,12 @@ def implicit(lobe: NDF, g: Geometry) -> float:
 
 def _lambert(albedo: Field, m: Any, g: Geometry) -> Field:
     return lambert(albedo)
+
+
+def density(facets: Any, g: Geometry) -> Field:
+    """D of the half vector, of an isotropic or a stretched distribution."""
+    values: Field = facets.density(g) if isinstance(facets, Stretched) else facets(g.sin2_h, g.cos2_h)
+    return values
 
 
 @dataclass(frozen=True)
@@ -57,7 +64,7 @@ class Parts:
         values = [] if self.albedo is None else [self.body(self.albedo(m, g), m, g)]
         for lobe in self.lobes:
             facets = lobe.facets(m)
-            values.append(microfacet(facets(g.sin2_h, g.cos2_h), lobe.reflectance(m, g), self.visibility(facets, g)))
+            values.append(microfacet(density(facets, g), lobe.reflectance(m, g), self.visibility(facets, g)))
         values += [term(m, g) for term in self.terms]
         total = values[0]
         for value in values[1:]:
@@ -77,4 +84,4 @@ class Composition(BRDF):
         return self.parts.evaluate(self, g)
 
 
-__all__ = ["Composition", "Lobe", "Parts", "implicit"]
+__all__ = ["Composition", "Lobe", "Parts", "density", "implicit"]

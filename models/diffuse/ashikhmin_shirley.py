@@ -2,10 +2,10 @@
 
 from __future__ import annotations
 
-import jax.numpy as jnp
 from jaxtyping import Array, Float
 
 from ...geometry import Geometry
+from .lambert import lambert
 
 
 def _rise(cosine: Float[Array, "..."]) -> Float[Array, "..."]:
@@ -14,6 +14,11 @@ def _rise(cosine: Float[Array, "..."]) -> Float[Array, "..."]:
     return x * (5 + x * (-10 + x * (10 + x * (-5 + x))))
 
 
+def ashikhmin_shirley_albedo(albedo: Float[Array, "..."], specular: Float[Array, ""], g: Geometry) -> Float[Array, "..."]:
+    """28/23 albedo (1 - specular)(1 - (1 - n.l/2)^5)(1 - (1 - n.v/2)^5): what a Schlick lobe leaves of a body's albedo."""
+    return 28 * albedo / 23 * (1 - specular) * (_rise(g.cos_i) * _rise(g.cos_o))
+
+
 def ashikhmin_shirley_body(albedo: Float[Array, ""], specular: Float[Array, ""], g: Geometry) -> Float[Array, "..."]:
-    """28 albedo/(23 pi) (1 - specular)(1 - (1 - n.l/2)^5)(1 - (1 - n.v/2)^5), in 1/sr."""
-    return 28 * albedo / (23 * jnp.pi) * (1 - specular) * (_rise(g.cos_i) * _rise(g.cos_o))
+    """That over pi, in 1/sr."""
+    return lambert(ashikhmin_shirley_albedo(albedo, specular, g))

@@ -3,19 +3,32 @@
 from __future__ import annotations
 
 from collections.abc import Iterable
-from functools import cache, lru_cache
+from functools import cache
 
 from ..assembled import assemble
 from ..base import Parameter
 from ..parts import Composition, Parts
+from .anisotropy import ANISOTROPY
 from .body import BODY
-from .effect import Effect
+from .diffraction import DIFFRACTION
+from .dispersion import DISPERSION
+from .effect import Effect, Shapes
 from .fresnel import FRESNEL
+from .interreflection import INTERREFLECTION
 from .lobe import LOBE
 from .masking import MASKING
+from .retro import RETRO
+from .rough_body import ROUGH_BODY
+from .second_lobe import SECOND_LOBE
 from .tail import TAIL
+from .trade_off import TRADE_OFF
 
-EFFECTS: dict[str, Effect] = {e.name: e for e in (BODY, LOBE, TAIL, FRESNEL, MASKING)}
+_ORDER = (
+    *(BODY, ROUGH_BODY, LOBE, TAIL, SECOND_LOBE, ANISOTROPY, DISPERSION, DIFFRACTION),
+    *(FRESNEL, MASKING, INTERREFLECTION, TRADE_OFF, RETRO),
+)
+
+EFFECTS: dict[str, Effect] = {e.name: e for e in _ORDER}
 """Every effect by name, in the order in which they are put together and named."""
 
 
@@ -55,6 +68,20 @@ def parts_of(*effects: str) -> Parts:
     return parts
 
 
+STARTS = 60
+"""Shapes that a fit starts from, at most: a search takes a fraction of a second for each."""
+
+
+def _shapes(cls: type[Composition], half_width: float) -> Shapes:
+    shapes: Shapes = [{}]
+    for name in cls.effects:
+        shapes = EFFECTS[name].start(half_width, shapes)
+    return shapes[:: -(-len(shapes) // STARTS)]
+
+
+_SHAPES = classmethod(_shapes)
+
+
 @cache
 def _composed(names: tuple[str, ...]) -> type[Composition]:
     parameters: dict[str, Parameter] = {}
@@ -71,6 +98,7 @@ def _composed(names: tuple[str, ...]) -> type[Composition]:
         base=Composition,
         parts=parts_of(*names),
         effects=names,
+        shapes=_SHAPES,
     )
     assert issubclass(cls, Composition)
     return cls

@@ -10,10 +10,21 @@ from ..base import Parameter
 from ..parts import Parts
 
 Declared = dict[str, Parameter]
+Shapes = list[dict[str, float]]
 
 
 def _nothing_else(parameters: Declared) -> Declared:
     return parameters
+
+
+def _from_defaults(half_width: float, shapes: Shapes) -> Shapes:
+    return shapes
+
+
+def crossed(shapes: Shapes, options: Shapes) -> Shapes:
+    """Every shape with some of the options, twice as many in all: the crossing of several effects would be too many."""
+    n = len(options)
+    return [s | options[(2 * k + r) % n] for k, s in enumerate(shapes) for r in range(2)]
 
 
 @dataclass(frozen=True)
@@ -33,7 +44,9 @@ class Effect:
     """Effects it makes no sense without: of each entry, as ``"lobe"`` or ``"lobe or diffraction"``, one."""
     declare: Callable[[Declared], Declared] = _nothing_else
     """What it changes about the parameters, its own and those of the effects before it."""
+    start: Callable[[float, Shapes], Shapes] = _from_defaults
+    """Shapes that fits start from, of the half-width of the measured lobe and the shapes without the effect."""
     references: tuple[str, ...] = ()
 
 
-__all__ = ["Declared", "Effect"]
+__all__ = ["Declared", "Effect", "Shapes", "crossed"]

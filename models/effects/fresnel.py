@@ -9,7 +9,8 @@ from jaxtyping import Array, Float
 from ...geometry import Geometry
 from ..fresnel import schlick
 from ..parts import Parts, Term
-from .effect import Effect
+from .effect import Declared, Effect
+from .lobe import LOBE
 
 
 def risen(reflectance: Term) -> Term:
@@ -25,12 +26,21 @@ def _add(parts: Parts, effects: frozenset[str]) -> Parts:
     return replace(parts, lobes=tuple(replace(lobe, reflectance=risen(lobe.reflectance)) for lobe in parts.lobes))
 
 
+def _declare(parameters: Declared) -> Declared:
+    """Diffraction without a lobe has its F0 from here; with one its scale and F0 multiply each other."""
+    if "scatter" not in parameters:
+        return parameters
+    specular = parameters.get("specular", LOBE.parameters["specular"].metadata["parameter"])
+    return parameters | {"specular": specular, "scatter": replace(parameters["scatter"], linear=False)}
+
+
 FRESNEL = Effect(
     "fresnel",
     "Fresnel's rise towards grazing, by Schlick's approximation",
     "F = specular + (1 - specular)(1 - cos theta_d)^5 in place of specular",
     {},
     _add,
-    needs=("lobe",),
+    needs=("lobe or diffraction",),
+    declare=_declare,
     references=("schlick1994",),
 )

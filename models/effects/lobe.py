@@ -6,13 +6,14 @@ from dataclasses import replace
 from typing import Any
 
 import jax.numpy as jnp
+import numpy as np
 from jaxtyping import Array, Float
 
 from ...geometry import Geometry
 from .. import ndf
 from ..base import NOT_NEGATIVE, POSITIVE, parameter
 from ..parts import Lobe, Parts
-from .effect import Effect
+from .effect import Effect, Shapes
 
 
 def width(m: Any) -> Float[Array, ""]:
@@ -34,6 +35,12 @@ def _add(parts: Parts, effects: frozenset[str]) -> Parts:
     return replace(parts, lobes=(Lobe(_facets, _reflectance),))
 
 
+def _start(half_width: float, shapes: Shapes) -> Shapes:
+    # GGX falls to half its height at tan^2(theta) = alpha^2 (sqrt(2) - 1)
+    alpha = np.tan(half_width) / np.sqrt(np.sqrt(2) - 1)
+    return [s | {"alpha": float(np.clip(k * alpha, 1e-6, 5))} for s in shapes for k in (0.1, 0.3, 0.6, 1.0, 2.0, 5.0)]
+
+
 LOBE = Effect(
     "lobe",
     "a lobe of microfacets with the GGX distribution and constant reflectance",
@@ -50,5 +57,6 @@ LOBE = Effect(
         "alpha": parameter("lobe width", valid=POSITIVE, search=(1e-9, 10), default=0.1, log=True),
     },
     _add,
+    start=_start,
     references=("trowbridge1975", "walter2007", "hoffman2013"),
 )

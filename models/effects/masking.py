@@ -3,14 +3,29 @@
 from __future__ import annotations
 
 from dataclasses import replace
+from typing import Any
 
-from ..masking import smith_correlated
+from jaxtyping import Array, Float
+
+from ...geometry import Geometry
+from ..masking import averted_area, smith_correlated
+from ..ndf.stretched import Stretched
 from ..parts import Parts
 from .effect import Effect
 
 
+def _visibility(facets: Any, g: Geometry) -> Float[Array, "..."]:
+    if not isinstance(facets, Stretched):
+        return smith_correlated(facets, g)
+    if g.light is None or g.viewer is None:
+        raise ValueError("an anisotropic lobe with masking needs directions, and this geometry has none")
+    cosines = (facets.stretched_cosine(w) for w in (g.light, g.viewer))
+    light, viewer = (averted_area(facets.round, c) / c for c in cosines)
+    return 0.25 / (g.cos_i * g.cos_o * (1 + light + viewer))
+
+
 def _add(parts: Parts, effects: frozenset[str]) -> Parts:
-    return replace(parts, visibility=smith_correlated)
+    return replace(parts, visibility=_visibility)
 
 
 MASKING = Effect(

@@ -8,7 +8,7 @@ from typing import Any
 from .. import ndf
 from ..base import POSITIVE, parameter
 from ..parts import Parts
-from .effect import Effect
+from .effect import Effect, Shapes
 from .lobe import width
 
 
@@ -21,6 +21,12 @@ def _add(parts: Parts, effects: frozenset[str]) -> Parts:
     return replace(parts, lobes=(replace(first, facets=_facets), *others))
 
 
+def _start(half_width: float, shapes: Shapes) -> Shapes:
+    """Its own widths: tails change them."""
+    others = [{k: v for k, v in s.items() if k != "alpha"} for s in shapes]
+    return [others[k % len(others)] | t for k, t in enumerate(ndf.GTR.shapes(half_width))]
+
+
 TAIL = Effect(
     "tail",
     "the fall-off of the lobe, with GTR in place of GGX",
@@ -28,5 +34,6 @@ TAIL = Effect(
     {"gamma": parameter("fall-off of the tail (2: GGX, 1: Berry)", valid=POSITIVE, search=(0.01, 1e7), default=2, log=True)},
     _add,
     needs=("lobe",),
+    start=_start,
     references=("burley2012", "hoffman2013"),
 )

@@ -1,0 +1,30 @@
+"""A lobe whose shape differs from channel to channel."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+
+from ..parts import Parts
+from .effect import Declared, Effect
+
+SHAPE = ("alpha", "alpha_x", "alpha_y", "gamma")
+
+
+def _add(parts: Parts, effects: frozenset[str]) -> Parts:
+    return parts
+
+
+def _declare(parameters: Declared) -> Declared:
+    return {n: replace(p, per_channel=True) if n in SHAPE else p for n, p in parameters.items()}
+
+
+DISPERSION = Effect(
+    "dispersion",
+    "a lobe shape for each channel",
+    "alpha (or alpha_x, alpha_y) and gamma per channel in place of one for all",
+    {},
+    _add,
+    needs=("lobe",),
+    declare=_declare,
+    references=("bagher2012",),
+)
