@@ -5,6 +5,7 @@ from __future__ import annotations
 from typing import TYPE_CHECKING, Any
 
 if TYPE_CHECKING:
+    from .data import preset as preset
     from .errors import InputError as InputError
     from .fitting import Fit as Fit
     from .fitting import Loss as Loss
@@ -41,6 +42,7 @@ _PUBLIC = {
     "microfacet": "models.factory",
     "model": "models",
     "parameter": "models",
+    "preset": "data",
     "save": "tables",
 }
 

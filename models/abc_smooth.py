@@ -2,12 +2,14 @@
 
 from __future__ import annotations
 
+from collections.abc import Iterable
 from typing import ClassVar
 
 import jax.numpy as jnp
 from jaxtyping import Array, Float
 
 from ..geometry import Geometry
+from .abc import ABC
 from .base import BRDF, NOT_NEGATIVE, POSITIVE, Interval, parameter
 from .common import diffuse_parameter
 from .diffuse import lambert
@@ -41,6 +43,11 @@ class ABCSmooth(BRDF):
     b: Float[Array, ""] = parameter("inverse width of the lobe", valid=POSITIVE, search=(1e-2, 1e9), default=100, log=True)
     c: Float[Array, ""] = parameter("fall-off of the tail", valid=NOT_NEGATIVE, search=(1e-3, 1e4), default=1, log=True)
     ior: Float[Array, ""] = parameter("index of refraction", valid=Interval(1), search=(1.001, 1001), default=1.5, log=True)
+
+    @classmethod
+    def shapes(cls, half_width: float) -> Iterable[dict[str, float]]:
+        """Those of ``abc``, whose 1 - n.h is half of sin^2(theta_h) near the pole."""
+        return [{**s, "b": s["b"] / 8} for s in ABC.shapes(half_width)]
 
     def evaluate(self, g: Geometry) -> Float[Array, "..."]:
         """Value in 1/sr."""

@@ -9,10 +9,10 @@ from jaxtyping import Array, Float
 from ..geometry import Geometry
 from . import ndf
 from .base import BRDF
-from .common import diffuse_parameter
+from .common import diffuse_parameter, stretched_shapes
 from .diffuse import lambert
 from .masking import kelemen
-from .ward import specular_parameter, width_parameter
+from .ward import Ward, specular_parameter, width_parameter
 
 
 class WardBounded(BRDF):
@@ -30,6 +30,11 @@ class WardBounded(BRDF):
     diffuse: Float[Array, " C"] = diffuse_parameter()
     specular: Float[Array, " C"] = specular_parameter()
     alpha: Float[Array, ""] = width_parameter("lobe width (rms slope times sqrt 2)")
+
+    @classmethod
+    def shapes(cls, half_width: float) -> list[dict[str, float]]:
+        """Those of Ward's lobe."""
+        return Ward.shapes(half_width)
 
     def evaluate(self, g: Geometry) -> Float[Array, "..."]:
         """Value in 1/sr."""
@@ -50,6 +55,11 @@ class WardBoundedAnisotropic(BRDF):
     specular: Float[Array, " C"] = specular_parameter()
     alpha_x: Float[Array, ""] = width_parameter("lobe width along the tangent")
     alpha_y: Float[Array, ""] = width_parameter("lobe width along the bitangent")
+
+    @classmethod
+    def shapes(cls, half_width: float) -> list[dict[str, float]]:
+        """Those of the round lobe, stretched."""
+        return stretched_shapes(Ward.shapes(half_width), "alpha")
 
     def evaluate(self, g: Geometry) -> Float[Array, "..."]:
         """Value in 1/sr."""

@@ -9,9 +9,9 @@ from jaxtyping import Array, Float
 from ..geometry import Geometry
 from . import ndf
 from .base import BRDF
-from .common import diffuse_parameter
+from .common import diffuse_parameter, stretched_shapes
 from .diffuse import lambert
-from .ward import specular_parameter, width_parameter
+from .ward import Ward, specular_parameter, width_parameter
 
 
 class WardDuer(BRDF):
@@ -27,6 +27,11 @@ class WardDuer(BRDF):
     diffuse: Float[Array, " C"] = diffuse_parameter()
     specular: Float[Array, " C"] = specular_parameter()
     alpha: Float[Array, ""] = width_parameter("lobe width (rms slope times sqrt 2)")
+
+    @classmethod
+    def shapes(cls, half_width: float) -> list[dict[str, float]]:
+        """Those of Ward's lobe."""
+        return Ward.shapes(half_width)
 
     def evaluate(self, g: Geometry) -> Float[Array, "..."]:
         """Value in 1/sr."""
@@ -46,6 +51,11 @@ class WardDuerAnisotropic(BRDF):
     specular: Float[Array, " C"] = specular_parameter()
     alpha_x: Float[Array, ""] = width_parameter("lobe width along the tangent")
     alpha_y: Float[Array, ""] = width_parameter("lobe width along the bitangent")
+
+    @classmethod
+    def shapes(cls, half_width: float) -> list[dict[str, float]]:
+        """Those of the round lobe, stretched."""
+        return stretched_shapes(Ward.shapes(half_width), "alpha")
 
     def evaluate(self, g: Geometry) -> Float[Array, "..."]:
         """Value in 1/sr."""
