@@ -45,6 +45,33 @@ def _finite(context: click.Context, option: click.Parameter, value: float) -> fl
     return value
 
 
+class Measure(click.ParamType[float]):
+    """A number with a unit of its own: ``1%`` or ``50ms``."""
+
+    def __init__(self, name: str, units: dict[str, float], below: float, example: str) -> None:
+        self.name = name
+        self.units = units
+        self.below = below
+        self.example = example
+
+    def convert(self, value: Any, param: click.Parameter | None, ctx: click.Context | None) -> float:
+        """The number in terms of the bare unit."""
+        if isinstance(value, float):
+            return value
+        text = str(value).strip()
+        unit = next((u for u in sorted(self.units, key=len, reverse=True) if text.endswith(u)), "")
+        try:
+            number = float(text.removesuffix(unit)) * self.units[unit]
+        except ValueError:
+            number = math.nan
+        if not 0 < number < self.below:
+            self.fail(f"{value!r} is not a {self.name}: write {self.example}", param, ctx)
+        return number
+
+
+SHARE = Measure("share", {"": 1.0, "%": 0.01}, 1.0, "1% or 0.01")
+DURATION = Measure("time", {"": 1.0, "s": 1.0, "ms": 1e-3}, math.inf, "500ms or 0.5s")
+
 _angles = click.option(
     "--angles",
     default="edge",
@@ -87,6 +114,8 @@ def commands() -> None:
 @_max_angle
 @click.option("--seed", default=0, show_default=True, type=click.IntRange(0), help="Seed of random starts.")
 @click.option("--json", "as_json", is_flag=True, help="Print fits.json on standard output, and no progress.")
+@click.option("--tolerance", type=SHARE, help="Cheapest settings that keep the error within this share of the best: 1%.")
+@click.option("--time-budget", type=DURATION, help="Best settings that prepare and fit a table in this time: 500ms.")
 @click.option("--report/--no-report", default=True, show_default=True, help="Write report.html.")
 @click.option("--quiet", is_flag=True, help="Print nothing.")
 def fit_command(
@@ -99,6 +128,8 @@ def fit_command(
     max_angle: float,
     seed: int,
     as_json: bool,
+    tolerance: float | None,
+    time_budget: float | None,
     report: bool,
     quiet: bool,
 ) -> int:
@@ -116,10 +147,19 @@ def fit_command(
     from .environment import environment
     from .fitting import fit_many
     from .reports import Views, preload, rebuild_report, save_evidence, write_fits
+    from .reports.words import planned
 
     fits: list[Fit] = []
     evidence: list[Evidence] = []
     where = environment()
+    options: dict[str, Any] = {
+        "loss": loss,
+        "measure": measure,
+        "max_angle": max_angle,
+        "seed": seed,
+        "tolerance": tolerance,
+        "time_budget": time_budget,
+    }
     interrupted = False
     with Progress(len(files) * len(names), silent=quiet or as_json) as progress:
         try:
@@ -127,10 +167,10 @@ def fit_command(
                 table = kept.pop(path) if path in kept else load(path, angles=angles)
                 progress.say(f"{table.material}: fitting")
                 first, views = len(fits), None
-                for f in fit_many([table], names, loss=loss, measure=measure, max_angle=max_angle, seed=seed):
+                for f in fit_many([table], names, **options):
                     fits[first:] = sorted([*fits[first:], f], key=lambda f: names.index(f.model_name))
                     write_fits(out, fits, where)
-                    progress.advance(_line(f))
+                    progress.advance("\n  ".join(filter(None, (_line(f), planned(f)))))
                     if report:  # meanwhile the next fits go on
                         preload()
                         views = views or Views(table, max_angle)

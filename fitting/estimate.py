@@ -59,6 +59,8 @@ class Judgement:
     """Error under each loss asked for."""
     shift: Reals
     """Standard errors by which one exact Gauss-Newton step over all cells would move each coordinate."""
+    gain: float
+    """Share of the error that this step would take off."""
 
 
 def judge(problem: Problem, x: Reals, box: Box, losses: tuple[Loss, ...]) -> Judgement:
@@ -105,7 +107,7 @@ def judge(problem: Problem, x: Reals, box: Box, losses: tuple[Loss, ...]) -> Jud
         statistical / scale[:, None] / scale,
         tuple(label for label, u in zip(labels, unknown, strict=True) if u),
     )
-    return Judgement(estimate, np.sqrt(found.sums[:, 0] / found.sums[:, 1]), u.shift)
+    return Judgement(estimate, np.sqrt(found.sums[:, 0] / found.sums[:, 1]), u.shift, u.gain)
 
 
 def _label(row: tuple[str, int | None]) -> str:

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 import threading
 import time
 from collections.abc import Mapping
@@ -22,6 +23,7 @@ from .effort import DEFAULT, Effort
 from .estimate import Judgement, judge
 from .gram import Problem, Span, loss_errors
 from .losses import LOSSES, Loss, LossFunction, named_loss
+from .plan import RUNGS, plan
 from .result import Fit, Named, Optimum
 from .samples import Samples, compress, samples
 from .search import Found, Stage, search, solve
@@ -113,6 +115,8 @@ def fit(
     anisotropic: bool | None = None,
     seed: int = 0,
     effort: Effort = DEFAULT,
+    tolerance: float | None = None,
+    time_budget: float | None = None,
 ) -> Fit:
     """Fit one model to all cells of one table, in float64.
 
@@ -129,6 +133,10 @@ def fit(
         anisotropic: Whether to fit the anisotropic form of a named model; by default if the table is anisotropic.
         seed: Seed of the starts of models that have no shapes of their own to start from.
         effort: Settings that trade time for accuracy.
+        tolerance: In place of ``effort`` the cheapest settings predicted to keep the error within this share of the best
+            fit's, in (0, 1). Where all cells then see more than half of it left to gain, better settings follow.
+        time_budget: In place of ``effort`` the best settings predicted to prepare and fit the table in so many seconds,
+            nothing compiled. :attr:`Fit.plan` says what was predicted.
 
     Returns:
         A :class:`Fit`. A fit that failed is a result with ``converged`` False and the ``reason`` in words.
@@ -137,15 +145,57 @@ def fit(
         ValueError: Unknown model, loss, measure or parameter name, or a value out of range.
         TypeError: A model or loss that is neither a name nor the right kind of object.
     """
-    named_loss(loss)
+    options: dict[str, Any] = {
+        "loss": named_loss(loss),
+        "measure": measure,
+        "max_angle": max_angle,
+        "fixed": fixed or {},
+        "bounds": bounds or {},
+        "start": start,
+        "anisotropic": anisotropic,
+        "seed": seed,
+    }
+    if tolerance is None and time_budget is None:
+        return _fit(table, model, effort=effort, **options)
     cls = model_class(model, (not table.isotropic) if anisotropic is None else anisotropic)
-    held: Named = {n: np.asarray(v, float) for n, v in (fixed or {}).items()}
+    cells = int(prepare(table, max_angle, measure, options["loss"]).used.sum())
+    chosen = plan(_name(cls), cells, tolerance, time_budget)
+    seconds = 0.0
+    while True:
+        found = _fit(table, model, effort=RUNGS[chosen.rung], **options)
+        seconds += found.seconds["solve"]
+        if tolerance is None or not found.gain > tolerance / 2 or chosen.rung == len(RUNGS) - 1:
+            return replace(found, plan=chosen, seconds={**found.seconds, "solve": seconds})
+        chosen = plan(_name(cls), cells, tolerance, time_budget, lowest=chosen.rung + 1)
+
+
+def _name(cls: type[BRDF]) -> str:
+    return getattr(cls, "name", cls.__name__.lower())
+
+
+def _fit(
+    table: Table,
+    model: Model,
+    *,
+    loss: Loss,
+    measure: str,
+    max_angle: float,
+    fixed: Mapping[str, ArrayLike],
+    bounds: Mapping[str, tuple[float, float]],
+    start: Mapping[str, ArrayLike] | None,
+    anisotropic: bool | None,
+    seed: int,
+    effort: Effort,
+) -> Fit:
+    """As :func:`fit`, with settings that are known."""
+    cls = model_class(model, (not table.isotropic) if anisotropic is None else anisotropic)
+    held: Named = {n: np.asarray(v, float) for n, v in fixed.items()}
     given = _given_start(cls, model, start)
-    _check_names(cls, {**held, **given, **dict(bounds or {})})
-    _check_bounds(cls, bounds or {})
+    _check_names(cls, {**held, **given, **dict(bounds)})
+    _check_bounds(cls, bounds)
     begin = time.perf_counter()
     with jax.enable_x64(True), compilation() as compiled:
-        ready = prepare(table, max_angle, measure, named_loss(loss), effort)
+        ready = prepare(table, max_angle, measure, loss, effort)
         used, bound_loss = ready.used, ready.loss
         prepared, early = time.perf_counter(), compiled.seconds
         frame: dict[str, Any] = {
@@ -153,7 +203,7 @@ def fit(
             "source": table.source,
             "sha256": table.sha256,
             "angles": table.angles,
-            "model_name": getattr(cls, "name", cls.__name__.lower()),
+            "model_name": _name(cls),
             "loss": bound_loss.name,
             "measure": measure,
             "max_angle": max_angle,
@@ -165,9 +215,11 @@ def fit(
             return _nothing(
                 frame, reason, {"load": table.seconds, "prepare": prepared - begin - early, "compile": early, "solve": 0.0}
             )
-        box = tuple(sorted((n, float(a), float(b)) for n, (a, b) in (bounds or {}).items()))
+        box = tuple(sorted((n, float(a), float(b)) for n, (a, b) in bounds.items()))
         forms = charts(cls, bool(held), box)
         proposals = list(starts(cls, ready.summary, seed))
+        count = math.ceil(effort.shapes * len(proposals))
+        proposals = [proposals[i * len(proposals) // count] for i in range(count)]
         if given:
             proposals.insert(0, {**proposals[0], **_per_channel(cls, given, table.channels)})
         proposals = [{**p, **_per_channel(cls, held, table.channels)} for p in proposals]
@@ -175,7 +227,7 @@ def fit(
         found = _search(forms, ready.samples, bound_loss, proposals, frozenset(held), effort)
         found, judged = settle(found, Problem(ready.samples, bound_loss, found[0].problem.chart), named, effort)
         errors = judged.errors
-    converged, reason = _verdict(found)
+    converged, reason = _verdict(found, effort.rtol)
     solve = time.perf_counter() - prepared - (compiled.seconds - early)
     return Fit(
         **frame,
@@ -195,6 +247,7 @@ def fit(
         passes=max(f.passes for f in found),
         path="exact" if any(f.exact for f in found) else "compressed",
         shift=float(judged.shift.max(initial=0.0)),
+        gain=judged.gain,
         effort=effort,
     )
 
@@ -340,12 +393,12 @@ def _per_channel(cls: type[BRDF], values: Named, channels: int) -> Named:
     return out
 
 
-def _verdict(found: list[Found]) -> tuple[bool, str]:
+def _verdict(found: list[Found], rtol: float) -> tuple[bool, str]:
     """Whether the fit converged, and why it stopped, in words; the worst channel speaks for all."""
-    return min((_ending(f.minimum) for f in sorted(found, key=lambda f: -float(f.minimum.cost))), key=lambda v: v[0])
+    return min((_ending(f.minimum, rtol) for f in sorted(found, key=lambda f: -float(f.minimum.cost))), key=lambda v: v[0])
 
 
-def _ending(end: Minimum) -> tuple[bool, str]:
+def _ending(end: Minimum, rtol: float) -> tuple[bool, str]:
     error, cosine, steps = float(np.sqrt(end.cost)), float(end.optimality), int(end.steps)
     if not np.isfinite(error) or error > 1e140:
         return False, "no start gave a finite error: the model is not defined where the data are"
@@ -353,9 +406,9 @@ def _ending(end: Minimum) -> tuple[bool, str]:
         return True, f"exact fit: the error is {error:.1g}, which is rounding"
     if not bool(end.stopped):
         return False, f"stopped at the limit of {steps} steps; the gradient is still {cosine:.1g} (cosine to the residual)"
-    if cosine > OPTIMAL:
+    if cosine > max(OPTIMAL, math.sqrt(rtol)):
         return False, f"stalled after {steps} steps: no step lowers the error, but the gradient is {cosine:.1g}, not 0"
-    return True, f"at a minimum: the last step changed the cost by less than 1e-9 of itself, gradient {cosine:.1g}"
+    return True, f"at a minimum: the last step changed the cost by less than {rtol:g} of itself, gradient {cosine:.1g}"
 
 
 def failed(material: str, model: Model, reason: str, options: Mapping[str, Any]) -> Fit:
@@ -366,7 +419,7 @@ def failed(material: str, model: Model, reason: str, options: Mapping[str, Any])
         "source": "",
         "sha256": "",
         "angles": "",
-        "model_name": getattr(cls, "name", cls.__name__.lower()),
+        "model_name": _name(cls),
         "loss": named_loss(options.get("loss", "log")).name,
         "measure": options.get("measure", "solid_angle"),
         "max_angle": options.get("max_angle", 80.0),

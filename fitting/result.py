@@ -10,6 +10,7 @@ from numpy.typing import NDArray
 
 from ..models import BRDF, build, parameters_of, variants
 from .effort import DEFAULT, Effort
+from .plan import Plan
 
 Reals = NDArray[np.float64]
 Named = dict[str, Reals]
@@ -23,7 +24,7 @@ class Optimum:
     starts: int
 
 
-@dataclass(frozen=True)
+@dataclass(frozen=True, eq=False)
 class Fit:
     """A fitted model. A fit that failed is a result too: ``converged`` is False and ``reason`` says why.
 
@@ -77,8 +78,12 @@ class Fit:
     each (``compressed``), to which the cells then agreed."""
     shift: float = 0.0
     """Standard errors by which one more exact step over all cells would move the parameter that it moves most."""
+    gain: float = 0.0
+    """Share of the error that this step would take off."""
     effort: Effort = DEFAULT
     """The settings it was made with."""
+    plan: Plan | None = None
+    """How the settings were chosen, where a tolerance or a time budget was given."""
 
     def strong_correlations(self, threshold: float = 0.95) -> list[tuple[str, str, float]]:
         """Pairs of parameters whose estimates are correlated beyond ``threshold``, strongest first."""
@@ -129,7 +134,9 @@ class Fit:
             "passes": self.passes,
             "path": self.path,
             "shift": _plain(self.shift),
+            "gain": _plain(self.gain),
             "effort": asdict(self.effort),
+            "plan": None if self.plan is None else _plain(asdict(self.plan)),
         }
 
 
@@ -171,7 +178,9 @@ def from_record(record: dict[str, Any]) -> Fit:
         passes=record.get("passes", 0),
         path=record.get("path", "exact"),
         shift=record.get("shift") or 0.0,
+        gain=record.get("gain") or 0.0,
         effort=Effort(**record.get("effort", {})),
+        plan=None if record.get("plan") is None else Plan(**record["plan"]),
     )
 
 

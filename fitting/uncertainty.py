@@ -32,6 +32,8 @@ class Uncertainty:
     """Coordinates that the data do not determine."""
     shift: Reals
     """The Gauss-Newton step from here, in standard errors; 0 for what cannot move."""
+    gain: float = 0.0
+    """Share of the error that this step would take off."""
 
 
 def uncertainty(bands: Reals, middle: Reals, moving: NDArray[np.bool_]) -> Uncertainty:
@@ -55,10 +57,12 @@ def uncertainty(bands: Reals, middle: Reals, moving: NDArray[np.bool_]) -> Uncer
     jackknife = np.zeros((n, count))
     jackknife[at] = np.sqrt((count - 1) / count) * deviation.T
     errors = np.linalg.norm(statistical[at], axis=1)
-    step = np.abs(_delete(total, at))
+    step = _delete(total, at)
     with np.errstate(divide="ignore", invalid="ignore"):
-        shift[at] = np.where(step > 0, step / errors, 0.0)
-    return Uncertainty(statistical, jackknife, undetermined, shift)
+        shift[at] = np.where(step != 0, np.abs(step) / errors, 0.0)
+    cost = float(total[-1, -1])
+    gain = -float(total[at, -1] @ step) / (2 * cost) if cost > 0 else 0.0  # half: the error is the root of the cost
+    return Uncertainty(statistical, jackknife, undetermined, shift, gain)
 
 
 def _delete(rest: Reals, at: NDArray[np.int64]) -> Reals:

@@ -77,7 +77,7 @@ def model_view(f: Fit, label: str, channel_names: tuple[str, ...]) -> View:
         "reason": f.reason,
         "parameters": _parameters(f, channel_names),
         "remarks": _remarks(f, channel_names),
-        "agreed": _agreed(f),
+        "agreed": " ".join(filter(None, (_agreed(f), words.planned(f)))),
         "time": _time(f),
         "code": f.model is not None,
     }

@@ -4,8 +4,12 @@ from __future__ import annotations
 
 import math
 from collections.abc import Iterable, Sequence
+from typing import TYPE_CHECKING
 
 import numpy as np
+
+if TYPE_CHECKING:
+    from ..fitting import Fit
 
 NONE = "\u2013"
 """Stands where there is no number."""
@@ -122,3 +126,28 @@ def listed(items: Iterable[str]) -> str:
 def triple(values: Sequence[float] | np.ndarray, digits: int = 3) -> str:
     """Values of the channels in a row."""
     return " ".join(significant(v, digits) for v in np.atleast_1d(values))
+
+
+def share(x: float) -> str:
+    """A share that may be very small, to one digit."""
+    return f"{significant(100 * x, 1)} %"
+
+
+def planned(f: Fit) -> str:
+    """What was asked of a fit, what was predicted of the settings chosen, and what came out; empty if nothing was asked."""
+    p = f.plan
+    if p is None:
+        return ""
+    asked = []
+    if p.tolerance is not None:
+        asked.append(f"at most {share(p.tolerance)} above the best error")
+    if p.time_budget is not None:
+        asked.append(f"in {seconds(p.time_budget)}")
+    took = f.seconds["prepare"] + f.seconds["solve"]
+    gain = f"one more step over every cell would take {share(max(f.gain, 0.0))} off the error; it took {seconds(took)}"
+    if p.excess is None or p.seconds is None:
+        predicted = "nothing, for lack of measurements of this model, so the usual settings were taken"
+        return f"Asked: {' and '.join(asked)}. Predicted: {predicted}. Came out: {gain}."
+    cannot = "" if p.holds else ", which is not what was asked; no setting is predicted to keep it"
+    predicted = f"{share(p.excess)} at most in 19 of 20 materials, in {seconds(p.seconds)}{cannot}"
+    return f"Asked: {' and '.join(asked)}. Predicted: {predicted}. Came out: {gain}."

@@ -6,6 +6,7 @@ import json
 from collections.abc import Sequence
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
+from weakref import WeakKeyDictionary
 
 from ..errors import InputError
 from ..files import StrPath, reading, replacing
@@ -23,8 +24,19 @@ VERSION = 1
 
 def write_fits(out_dir: StrPath, fits: Sequence[Fit], environment: dict[str, Any]) -> Path:
     """Write DIR/fits.json. All that says when and where is in ``environment``; the rest follows from the input."""
-    document = {"format": FORMAT, "version": VERSION, "environment": environment, "fits": [f.record() for f in fits]}
-    return _write(Path(out_dir) / FITS, json.dumps(document, indent=1, ensure_ascii=False, allow_nan=False) + "\n")
+    head = json.dumps({"format": FORMAT, "version": VERSION, "environment": environment}, indent=1, ensure_ascii=False)
+    entries = ",\n".join(_entry(f) for f in fits)
+    return _write(Path(out_dir) / FITS, f'{head[:-2]},\n "fits": [\n{entries}\n ]\n}}\n')
+
+
+_entries: WeakKeyDictionary[Fit, str] = WeakKeyDictionary()
+
+
+def _entry(f: Fit) -> str:
+    """A fit as JSON, made once: the file is written anew after every fit."""
+    if f not in _entries:
+        _entries[f] = json.dumps(f.record(), indent=1, ensure_ascii=False, allow_nan=False)
+    return _entries[f]
 
 
 def read_fits(out_dir: StrPath) -> tuple[list[Fit], dict[str, Any]]:
