@@ -28,7 +28,7 @@ class HTSG(BRDF):
     in the paper, is theirs too. D is a series, of which less than 1e-15 is left out
     (:func:`~brdfit.models.kirchhoff.scattering_series`). The roughness that light sees, sigma/sqrt(1 + (z/sigma)^2) with
     z by eq. 80, is closed by Lambert's W.
-    Reciprocal; energy is not bounded by the scale. Known failures: for sigma beyond 1 only sigma/tau is determined, for sigma
+    Reciprocal; energy is not bounded by the scale. Known failures: for sigma above 1 only sigma/tau is determined, for sigma
     below 0.05 only specular sigma^2; specular and ior trade off. The slowest of the models: 128 terms a value.
     """
 
@@ -47,12 +47,12 @@ class HTSG(BRDF):
 
     @classmethod
     def shapes(cls, half_width: float) -> list[dict[str, float]]:
-        """Smooth to rough heights, with the correlation length that makes the lobe as wide, half, and twice as wide."""
+        """Smooth to rough heights, with the correlation length that makes the lobe as wide, and half as wide."""
         found = []
         for sigma in (0.05, 0.15, 0.5, 2.0):
             orders = max(1.0, (4 * np.pi * sigma) ** 2)
             tau = np.sqrt(np.log(2) * orders) / (2 * np.pi * np.sin(half_width))
-            for k in (0.5, 1.0, 2.0):
+            for k in (1.0, 2.0):
                 found += [{"sigma": sigma, "tau": float(np.clip(tau * k, 0.06, 900)), "ior": n} for n in (1.5, 10.0)]
         return found
 
