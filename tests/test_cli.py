@@ -186,7 +186,7 @@ def test_both_forms_name_the_version(form):
         ("fit --out new", "brdfit fit: Missing argument 'FILE...'."),
         ("fit FILE", "brdfit fit: Missing option '--out'."),
         ("fit FILE nope.binary --out new", "brdfit: nope.binary: no such file; check the path"),
-        ("fit FILE --out new --model ward,phong", "brdfit fit: unknown model 'phong': choose from gtr, abc, sgd,"),
+        ("fit FILE --out new --model ward,minnaert", "brdfit fit: unknown model 'minnaert': choose from gtr, abc, sgd,"),
         ("fit FILE --out new --model ,", "brdfit fit: --model names no model"),
         ("fit FILE --out new --loss l2", "brdfit fit: unknown loss 'l2': choose from log, low, bieron,"),
         ("fit FILE --out new --measure area", "brdfit fit: Invalid value for '--measure': 'area' is not one of"),

@@ -400,7 +400,7 @@ def test_command(small_file, tmp_path, quick, capfd):
 
 def test_wrong_use_is_one_line_and_nothing_is_written(small_file, tmp_path, capfd):
     for arguments, words in (
-        ([str(small_file), "--model", "phong"], "unknown model 'phong': choose from gtr"),
+        ([str(small_file), "--model", "minnaert"], "unknown model 'minnaert': choose from gtr"),
         ([str(small_file), "--loss", "l2"], "unknown loss 'l2'"),
         ([str(tmp_path / "none.binary")], "no such file"),
     ):
