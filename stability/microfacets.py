@@ -1,4 +1,4 @@
-"""Microfacet models and their blocks in 40-digit arithmetic, transcribed from the papers and not from the code under test."""
+"""Microfacet models and their blocks in 40-digit arithmetic, transcribed from the papers, not from the code under test."""
 
 from __future__ import annotations
 
