@@ -117,11 +117,11 @@ def page(cells: list[dict[str, float]], channels: list[dict[str, float]], materi
         f"Made on {date.today().isoformat()} by `python benchmarks/growth.py --out docs/growth.md` ({os.cpu_count()} cores,",
         f"{platform.machine()}). Synthetic `ward` with 2 % noise; seconds of a fit with everything compiled.",
         "",
-        "Scattered samples, every one of them in every pass (no compression), one channel. The samples are kept once more in",
-        "the order of the passes, with what the model needs of their directions; a pass itself needs the same few blocks",
-        "whatever the table.",
+        "Scattered samples, every one of them in every pass (no compression), one channel. The samples are kept once more",
+        "in the order of the passes, with what the model needs of their directions; a pass itself needs the same few",
+        "blocks whatever the table.",
         "",
-        "| samples | prepare, s | search and error bars, s | per sample, ns | peak above the table, MB | per sample, bytes |",
+        "| samples | prepare, s | search and error bars, s | per sample, ns | peak above table, MB | per sample, bytes |",
         "|---|---|---|---|---|---|",
     ]
     lines += [
