@@ -5,6 +5,7 @@ from __future__ import annotations
 import json
 import math
 import os
+import re
 from collections.abc import Sequence
 from pathlib import Path
 from tempfile import TemporaryFile
@@ -113,6 +114,13 @@ def commands() -> None:
 @_angles
 @_max_angle
 @click.option("--seed", default=0, show_default=True, type=click.IntRange(0), help="Seed of random starts.")
+@click.option(
+    "--start",
+    default="data",
+    show_default=True,
+    type=click.Choice(["data", "published"]),
+    help="Start from the data, or also from the published fit of the model to the material.",
+)
 @click.option("--json", "as_json", is_flag=True, help="Print fits.json on standard output, and no progress.")
 @click.option("--tolerance", type=SHARE, help="Cheapest settings that keep the error within this share of the best: 1%.")
 @click.option("--time-budget", type=DURATION, help="Best settings that prepare and fit a table in this time: 500ms.")
@@ -127,6 +135,7 @@ def fit_command(
     angles: Any,
     max_angle: float,
     seed: int,
+    start: str,
     as_json: bool,
     tolerance: float | None,
     time_budget: float | None,
@@ -157,6 +166,7 @@ def fit_command(
         "measure": measure,
         "max_angle": max_angle,
         "seed": seed,
+        "start": None if start == "data" else start,
         "tolerance": tolerance,
         "time_budget": time_budget,
     }
@@ -304,7 +314,7 @@ def _checked_names(models: str, loss: str) -> list[str]:
     from .fitting.losses import LOSSES
     from .models import variants
 
-    names = list(dict.fromkeys(m.strip() for m in models.split(",") if m.strip()))
+    names = list(dict.fromkeys(m.strip() for m in re.split(r",(?![^(]*\))", models) if m.strip()))
     if not names:
         raise click.UsageError("--model names no model", click.get_current_context())
     try:

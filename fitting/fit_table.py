@@ -7,7 +7,7 @@ import threading
 import time
 from collections.abc import Mapping
 from dataclasses import dataclass, replace
-from typing import Any
+from typing import Any, Literal
 from weakref import WeakKeyDictionary
 
 import jax
@@ -111,7 +111,7 @@ def fit(
     max_angle: float = 80.0,
     fixed: Mapping[str, ArrayLike] | None = None,
     bounds: Mapping[str, tuple[float, float]] | None = None,
-    start: Mapping[str, ArrayLike] | None = None,
+    start: Mapping[str, ArrayLike] | Literal["published"] | None = None,
     anisotropic: bool | None = None,
     seed: int = 0,
     effort: Effort = DEFAULT,
@@ -129,7 +129,8 @@ def fit(
         max_angle: Largest polar angle of either direction, degrees, in (0, 90).
         fixed: Parameters to hold at given values, ``[]`` or ``[C]``.
         bounds: ``(lower, upper)`` in place of a parameter's default search box.
-        start: Parameters of one more start; those left out take their defaults.
+        start: Parameters of one more start; those left out take their defaults. Or "published": the published fit of the
+            model to the material, by its name, if there is one.
         anisotropic: Whether to fit the anisotropic form of a named model; by default if the table is anisotropic.
         seed: Seed of the starts of models that have no shapes of their own to start from.
         effort: Settings that trade time for accuracy.
@@ -182,7 +183,7 @@ def _fit(
     max_angle: float,
     fixed: Mapping[str, ArrayLike],
     bounds: Mapping[str, tuple[float, float]],
-    start: Mapping[str, ArrayLike] | None,
+    start: Mapping[str, ArrayLike] | str | None,
     anisotropic: bool | None,
     seed: int,
     effort: Effort,
@@ -190,7 +191,7 @@ def _fit(
     """As :func:`fit`, with settings that are known."""
     cls = model_class(model, (not table.isotropic) if anisotropic is None else anisotropic)
     held: Named = {n: np.asarray(v, float) for n, v in fixed.items()}
-    given = _given_start(cls, model, start)
+    given = _given_start(cls, model, start, table)
     _check_names(cls, {**held, **given, **dict(bounds)})
     _check_bounds(cls, bounds)
     begin = time.perf_counter()
@@ -352,8 +353,15 @@ def _scaled(found: list[Found], error: float) -> tuple[Optimum, ...]:
     return tuple(Optimum(o.error / best * error, o.starts) for o in optima)
 
 
-def _given_start(cls: type[BRDF], model: Model, start: Mapping[str, ArrayLike] | None) -> Named:
+def _given_start(cls: type[BRDF], model: Model, start: Mapping[str, ArrayLike] | str | None, table: Table) -> Named:
     given = dict(parameter_values(model)) if isinstance(model, BRDF) else {}
+    if isinstance(start, str):
+        if start != "published":
+            raise ValueError(f"start is a mapping of parameters or 'published', not {start!r}")
+        from ..data.presets import published_start  # the numbers are read when they are asked for
+
+        start = published_start(_name(cls), table.material) if table.channels == 3 else None
+        start = start if start and set(start) == {p.name for p in parameters_of(cls)} else None
     return given | {n: np.asarray(v, float) for n, v in (start or {}).items()}
 
 
