@@ -50,6 +50,7 @@ REFERENCES: dict[str, str] = {
     "of reflectance functions. Proc. SIGGRAPH 97, 117-126. doi:10.1145/258734.258801",
     "strauss1990": "Strauss, P. S. (1990). A realistic lighting model for computer animators. IEEE Computer Graphics and "
     "Applications 10(6), 56-64. doi:10.1109/38.62696",
+    "granier2003": "Granier, X., Heidrich, W. (2003). A simple layered RGB BRDF model. Graphical Models 65(4), 171-184.",
     "he1991": "He, X. D., Torrance, K. E., Sillion, F. X., Greenberg, D. P. (1991). A comprehensive physical model for "
     "light reflection. Computer Graphics (Proc. SIGGRAPH) 25(4), 175-186. doi:10.1145/127719.122738",
     "stam1999": "Stam, J. (1999). Diffraction shaders. Proc. SIGGRAPH 99, 101-110. doi:10.1145/311535.311546",

@@ -20,6 +20,7 @@ from .effects import EFFECTS, compose
 from .epd import EPD
 from .factory import by_name
 from .ggx import GGX
+from .granier_heidrich import GranierHeidrich
 from .gtr import GTR
 from .htsg import HTSG
 from .lafortune import Lafortune, Lafortune2, Lafortune3
@@ -76,6 +77,7 @@ MODELS: dict[str, tuple[type[BRDF], ...]] = {
     "strauss": (Strauss,),
     "schwenk": (Schwenk,),
     "distribution_based": (DistributionBased,),
+    "granier_heidrich": (GranierHeidrich,),
     "htsg": (HTSG,),
     "stam_diffraction": (StamDiffraction,),
 }

@@ -173,6 +173,25 @@ def distribution_based(l: Vector, v: Vector, diffuse: Any, specular: Any, f0: An
     return diffuse / mp.pi + specular * _schlick_fresnel(f0, l, v) * lobe
 
 
+def granier_heidrich(
+    l: Vector, v: Vector, diffuse: Any, specular: Any, ior: Any, thickness: Any, exponent: Any, base_exponent: Any
+) -> Any:
+    """After Granier & Heidrich (2003): the surface of a layer and its base, with Snell's law and Fresnel's equations."""
+
+    def enter(w: Vector) -> tuple[Vector, Any]:
+        inside = [w[0] / ior, w[1] / ior, mp.sqrt(1 - (w[0] ** 2 + w[1] ** 2) / ior**2)]
+        s = (w[2] - ior * inside[2]) / (w[2] + ior * inside[2])
+        p = (ior * w[2] - inside[2]) / (ior * w[2] + inside[2])
+        return inside, (s * s + p * p) / 2
+
+    (li, rl), (vi, rv) = enter(l), enter(v)
+    top = mp.sqrt(rl * rv) * _power(_dot(_mirror(l), v), exponent)
+    base = (1 - rl) * (1 - rv) * _power(_dot(_mirror(li), vi), base_exponent)
+    phase = 4 * mp.pi * thickness * ior * (li[2] + vi[2]) / 2
+    lobe = top + base + 2 * mp.sqrt(top * base) * mp.cos(phase)
+    return diffuse / mp.pi + specular * (exponent + 2) / (2 * mp.pi) * lobe
+
+
 def series(g: Any, t: Any) -> Any:
     """Sum over m >= 1 of g^m e^-g/(m! m) exp(-t/m), term by term either way from the largest until they are below 1e-45."""
     top = max(1, int(g))
@@ -268,6 +287,7 @@ MODELS: dict[str, Callable[..., Any]] = {
     "Strauss": strauss,
     "Schwenk": schwenk,
     "DistributionBased": distribution_based,
+    "GranierHeidrich": granier_heidrich,
     "HTSG": htsg,
     "StamDiffraction": stam,
     **microfacets.MODELS,

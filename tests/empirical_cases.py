@@ -113,6 +113,8 @@ SURFACES = [
     (1.2, 9.0),
     (2.5, 60.0),
 ]
+LAYERED = {"diffuse": 0.1, "specular": 0.3, "ior": 1.5, "thickness": 0.2, "exponent": 50.0, "base_exponent": 20.0}
+FILMS = [{"thickness": 0.0}, {"thickness": 3.0}, {"ior": 1.001}, {"ior": 4.0}, {"exponent": 1e6}, {"base_exponent": 1e6}]
 
 EMPIRICAL: tuple[Row, ...] = (
     row("phong", LOBE, *EXPONENTS, reciprocal=False, truth={"exponent": 40.0}),
@@ -136,6 +138,7 @@ EMPIRICAL: tuple[Row, ...] = (
     row("strauss", PLASTIC, *SMOOTH, reciprocal=False, kink=NORMAL, tolerance=1e-9),  # angles of 1e-8 are lost in the cosine
     row("schwenk", GLOSSY, {"smoothness": 0.0}, {"smoothness": 1.0, "diffuse": 0.0}, {"specular": 0.0}, {"scale": 0.0}),
     row("distribution_based", TABULATED, {"f0": 1.0}, {"p_3": -20.0}, {"p_1": 3.0, "p_2": 3.0}, grid=(48, 8, 6)),
+    row("granier_heidrich", LAYERED, *FILMS, truth={"ior": [1.5, 1.7], "thickness": [0.2, 0.3]}),
     row(
         "htsg",
         WAVES,
