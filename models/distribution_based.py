@@ -39,7 +39,7 @@ def _basis(x: Float[Array, "..."]) -> Float[Array, "..."]:
 
 
 class DistributionBased(BRDF):
-    """f = diffuse/pi + specular p(h) F_schlick(f0, c_d)/(n.l + n.v - (n.l)(n.v)) (Ashikhmin & Premoze 2007, eq. 5).
+    """f = diffuse/pi + specular p(h) F_schlick(f0, c_d)/(n.l + n.v - (n.l)(n.v)) (Ashikhmin & Premoze 2007).
 
     ln p is a cubic B-spline of u = ln(1 + sin^2(theta_h)/0.002^2), straight beyond its ends, with coefficients 0, p_1 ...
     p_11 at twelve evenly spaced u: p(n) = 1, and its scale is specular, one for each channel. The paper tabulates p from

@@ -29,9 +29,9 @@ def _layer(ior: Float[Array, ""], cosine: Float[Array, "..."]) -> tuple[Float[Ar
 
 class GranierHeidrich(BRDF):
     """f = diffuse/pi + specular (e + 2)/(2 pi) [a + b + 2 sqrt(a b) cos(4 pi thickness ior c)], where
-    a = sqrt(R(l) R(v)) (r.v)^e is reflected by the surface of a layer and b = T(l) T(v) (r'.v')^e' by its base: R is Fresnel's
-    reflectance, T = 1 - R, l' and v' are refracted into the layer, r' is the mirror of l', e' = base_exponent, and c is the
-    mean of the cosines of l' and v' (after Granier & Heidrich 2003).
+    a = sqrt(R(l) R(v)) (r.v)^e is reflected by the surface of a layer and b = T(l) T(v) (r'.v')^e' by its base: R is
+    Fresnel's reflectance, T = 1 - R, l' and v' are refracted into the layer, r' is the mirror of l', e' = base_exponent, and
+    c is the mean of the cosines of l' and v' (after Granier & Heidrich 2003).
 
     Each channel has an index, and a thickness in its wavelength: that is the paper's RGB in place of a spectrum. Deviations:
     the paper draws thicknesses and normals from a noise; here the layer is even and flat. There R and the phase are of one

@@ -19,15 +19,16 @@ from .kirchhoff import kirchhoff
 
 
 class HTSG(BRDF):
-    """f = diffuse/pi + specular F_dielectric(ior, c_d) S(l) S(v) G D / (pi n.l n.v) (He et al. 1991, eq. 71 to 84): the
-    uniform-diffuse and the directional-diffuse term. The third term, the light that leaves in the mirror direction alone, is
-    in no table: :meth:`mirror_reflectance`.
+    """f = diffuse/pi + specular F_dielectric(ior, c_d) S(l) S(v) G D / (pi n.l n.v) (He et al. 1991, eq. 24, 25 and 76 to
+    83): the uniform-diffuse and the directional-diffuse term. The third term, the light that leaves in the mirror direction
+    alone, is in no table: :meth:`mirror_reflectance`.
 
     sigma and tau, height and correlation length of the surface, are in wavelengths and, as in Ngan et al. (2005), shared
     by the channels: the paper has lengths, and a wavelength and complex index for each channel. The scale ``specular``, 1
     in the paper, is theirs too. D is a series, of which less than 1e-15 is left out
     (:func:`~brdfit.models.kirchhoff.scattering_series`). The roughness that light sees, sigma/sqrt(1 + (z/sigma)^2) with
-    z by eq. 80, is closed by Lambert's W.
+    z by eq. 80, is closed by Lambert's W. Eq. 25 as printed lacks the exp(-a^2) that Smith's Lambda and its errata have, and
+    v in eq. 78 has to carry 2 pi/lambda: so, for sigma -> infinity, F S D/(4 n.l n.v) with Beckmann's D is left.
     Reciprocal; energy is not bounded by the scale. Known failures: for sigma above 1 only sigma/tau is determined, for sigma
     below 0.05 only specular sigma^2; specular and ior trade off. The slowest of the models: 128 terms a value.
     """
@@ -64,7 +65,7 @@ class HTSG(BRDF):
 
     def mirror_reflectance(self, wi: ArrayLike) -> Float[Array, "... C"]:
         """F e^(-g) S: the part of the light from ``wi`` ``[..., 3]`` that leaves in the mirror direction, ``[..., C]``
-        (He et al. 1991, eq. 72).
+        (He et al. 1991, the specular term).
         """
         wi = jnp.asarray(wi)
         g = from_directions(wi, wi * jnp.array([-1, -1, 1], wi.dtype))

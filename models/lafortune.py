@@ -46,7 +46,8 @@ def _numbered(*lobes: tuple[float, float]) -> dict[str, float]:
 
 class Lafortune(BRDF):
     """f = diffuse/pi + specular (e + 2)/(2 pi) [(C_xy (l_x v_x + l_y v_y) + C_z l_z v_z)/max(|C_xy|, C_z)]^e, 0 where the
-    bracket is negative; tan(tilt) = -C_xy/C_z (Lafortune et al. 1997, eq. 9, in the scale of Ngan et al. 2005).
+    bracket is negative; tan(tilt) = -C_xy/C_z (Lafortune et al. 1997; Schwenk 2011, eq. 45; in the
+    scale of Ngan et al. 2005).
 
     The published C_x = C_y and C_z have a scale, which only multiplies the lobe: what is left is the angle tilt. At pi/4 the
     lobe is Phong's, beyond it leans to grazing, as measured lobes do, and at -pi/4 it returns to the light. One angle and
@@ -56,7 +57,7 @@ class Lafortune(BRDF):
     """
 
     name: ClassVar[str] = "lafortune"
-    references: ClassVar[tuple[str, ...]] = ("lafortune1997", "ngan2005")
+    references: ClassVar[tuple[str, ...]] = ("lafortune1997", "ngan2005", "schwenk2011")
 
     diffuse: Float[Array, " C"] = diffuse_parameter()
     specular: Float[Array, " C"] = lobe_parameter()
@@ -75,13 +76,13 @@ class Lafortune(BRDF):
 
 
 class Lafortune2(BRDF):
-    """f = diffuse/pi + the sum of two lobes as those of :class:`Lafortune` (Lafortune et al. 1997, eq. 9).
+    """f = diffuse/pi + the sum of two lobes as those of :class:`Lafortune` (Schwenk 2011, eq. 45).
 
     Known failures: as there; and lobes that are alike share their scale in any proportion.
     """
 
     name: ClassVar[str] = "lafortune2"
-    references: ClassVar[tuple[str, ...]] = ("lafortune1997", "ngan2005")
+    references: ClassVar[tuple[str, ...]] = ("lafortune1997", "ngan2005", "schwenk2011")
 
     diffuse: Float[Array, " C"] = diffuse_parameter()
     specular_1: Float[Array, " C"] = lobe_parameter()
@@ -106,13 +107,13 @@ class Lafortune2(BRDF):
 
 
 class Lafortune3(BRDF):
-    """f = diffuse/pi + the sum of three lobes as those of :class:`Lafortune` (Lafortune et al. 1997, eq. 9).
+    """f = diffuse/pi + the sum of three lobes as those of :class:`Lafortune` (Schwenk 2011, eq. 45).
 
     Known failures: as of :class:`Lafortune2`.
     """
 
     name: ClassVar[str] = "lafortune3"
-    references: ClassVar[tuple[str, ...]] = ("lafortune1997", "ngan2005")
+    references: ClassVar[tuple[str, ...]] = ("lafortune1997", "ngan2005", "schwenk2011")
 
     diffuse: Float[Array, " C"] = diffuse_parameter()
     specular_1: Float[Array, " C"] = lobe_parameter()

@@ -15,7 +15,7 @@ from .mirror import cosine_power, mirror_deficit
 
 
 class ModifiedPhong(BRDF):
-    """f = diffuse/pi + specular (e + 2)/(2 pi) (r.v)^e (Lafortune & Willems 1994, eq. 7; Schwenk 2011, eq. 27).
+    """f = diffuse/pi + specular (e + 2)/(2 pi) (r.v)^e (Lafortune & Willems 1994; Schwenk 2011, eq. 27).
 
     The bound of the survey, garbled to "ks <= e+2 / 2", is its scale in units of 1/pi: the integral of cos^(e+1) over the
     hemisphere is 2 pi/(e + 2), so that the albedo of the lobe is specular at normal incidence and less elsewhere.

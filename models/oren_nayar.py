@@ -20,7 +20,8 @@ def _sigma() -> Any:
 
 class OrenNayar(BRDF):
     """f = diffuse/pi (A + B max(0, cos(phi_i - phi_o)) sin(alpha) tan(beta)), A = 1 - sigma^2/(2 (sigma^2 + 0.33)),
-    B = 0.45 sigma^2/(sigma^2 + 0.09), alpha the larger and beta the smaller polar angle (Oren & Nayar 1994, eq. 30).
+    B = 0.45 sigma^2/(sigma^2 + 0.09), alpha the larger and beta the smaller polar angle (Oren & Nayar 1994; Schwenk 2011,
+    eq. 34).
 
     The survey's A has lost its fraction and its sigmas: with 1/2 sigma^2/(sigma^2 + 0.33), sigma = 0 is Lambert's law.
     Reciprocal. Without interreflection, so that it darkens with roughness at normal incidence; towards grazing its albedo
@@ -46,8 +47,8 @@ class OrenNayar(BRDF):
 
 class OrenNayarFull(BRDF):
     """f = diffuse/pi [C1 + c C2 tan(beta) + (1 - |c|) C3 tan((alpha + beta)/2)]
-    + 0.17 diffuse^2/pi sigma^2/(sigma^2 + 0.13) [1 - c (2 beta/pi)^2], c = cos(phi_i - phi_o) (Oren & Nayar 1994, eq. 27 to
-    29; the coefficients stand at :func:`~brdfit.models.diffuse.oren_nayar_full`).
+    + 0.17 diffuse^2/pi sigma^2/(sigma^2 + 0.13) [1 - c (2 beta/pi)^2], c = cos(phi_i - phi_o) (Oren & Nayar 1994,
+    the functional form with interreflection; the coefficients stand at :func:`~brdfit.models.diffuse.oren_nayar_full`).
 
     The last term is light reflected twice within a groove: the BRDF is not affine in diffuse. Reciprocal. Energy is not
     bounded by the form, C1 to C3 being fits to numerical integrals. Known failure: for sigma above some 0.6 it is negative

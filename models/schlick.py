@@ -47,8 +47,8 @@ def _transmitted(f0: Float[Array, ""], g: Geometry) -> Float[Array, "..."]:
 
 class Schlick(BRDF):
     """f = F D, F = specular + (1 - specular)(1 - c_d)^5, D = (1 - G G')/pi + G G' Z/(4 pi n.l n.v),
-    Z = r/(1 + r (n.h)^2 - (n.h)^2)^2, G = n.l/(r - r n.l + n.l), G' of n.v likewise, r = roughness (Schlick 1994, eq. 15 and
-    28 to 31), for a single layer.
+    Z = r/(1 + r (n.h)^2 - (n.h)^2)^2, G = n.l/(r - r n.l + n.l), G' of n.v likewise, r = roughness (Schlick 1994; Schwenk
+    2011, eq. 49), for a single layer.
 
     The survey's eq. 49 has lost pi: the integral of (n.h) Z/pi over the hemisphere is 1 (Z/pi is Trowbridge and Reitz's
     distribution with alpha^2 = r), so the lobe stands over 4 pi; what it masks returns diffusely, over pi. The azimuthal
@@ -75,7 +75,7 @@ class Schlick(BRDF):
 
 class SchlickTwoLayers(BRDF):
     """f = F D + (1 - F) F' D', each as of :class:`Schlick`: a layer of specular and roughness over one of base and
-    base_roughness (Schlick 1994, eq. 16; Schwenk 2011, eq. 48).
+    base_roughness (Schlick 1994; Schwenk 2011, eq. 48).
 
     Reciprocal. Energy is not bounded by the form. Known failure: light that the second layer reflects passes the first one
     once, so that a base is too bright at grazing.

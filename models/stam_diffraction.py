@@ -20,8 +20,8 @@ def _length(meaning: str, default: float, search: tuple[float, float]) -> Any:
 
 
 class StamDiffraction(BRDF):
-    """f = diffuse/pi + specular F_dielectric(ior, c_d) G D / (pi n.l n.v), G D as in :class:`HTSG` (Stam 1999, eq. 9 and 15,
-    for an isotropic surface with Gaussian correlation).
+    """f = diffuse/pi + specular F_dielectric(ior, c_d) G D / (pi n.l n.v), G D as in :class:`HTSG` (Stam 1999, for an
+    isotropic surface with Gaussian correlation).
 
     Stam's (1 + l.v)^2/(n.l + n.v)^2 is (c_d/(n.h))^2, and his transform of the surface is the series of He et al., of whose
     model this is the case without masking: neither S nor the effective roughness. What is his is colour: sigma and tau are

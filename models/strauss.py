@@ -35,7 +35,7 @@ def _unshadowed(x: Float[Array, "..."]) -> Float[Array, "..."]:
 class Strauss(BRDF):
     """f = [(1 - m s) r_d diffuse + r_j (r.v)^(3/(1 - s)) (1 + m (1 - F(l)) (diffuse - 1))/n.l]/pi, with
     r_d = (1 - s^3)(1 - t), r_n = (1 - t) - r_d, r_j = min(1, r_n + (r_n + 0.1) F(l) G(l) G(v)); F and G are rational in
-    the polar angles (Strauss 1990, eq. 1 to 14; Schwenk 2011, eq. 46).
+    the polar angles (Strauss 1990; Schwenk 2011, eq. 46).
 
     s, m, t = smoothness, metalness, transparency; diffuse is the colour C. The survey's formula gives intensities under a
     light of intensity 1; over pi, it is Lambert's law at s = m = t = 0, F = 0. It prints r_j without its last bracket.

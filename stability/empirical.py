@@ -49,7 +49,7 @@ def phong(l: Vector, v: Vector, diffuse: Any, specular: Any, exponent: Any) -> A
 
 
 def modified_phong(l: Vector, v: Vector, diffuse: Any, specular: Any, exponent: Any) -> Any:
-    """Lafortune & Willems (1994), eq. 7."""
+    """Lafortune & Willems (1994); Schwenk (2011), eq. 27."""
     return diffuse / mp.pi + specular * (exponent + 2) / (2 * mp.pi) * _power(_dot(_mirror(l), v), exponent)
 
 
@@ -79,7 +79,7 @@ def _polar(l: Vector, v: Vector) -> tuple[Any, Any, Any]:
 
 
 def oren_nayar(l: Vector, v: Vector, diffuse: Any, sigma: Any) -> Any:
-    """Oren & Nayar (1994), eq. 30."""
+    """Schwenk (2011), eq. 34."""
     alpha, beta, c = _polar(l, v)
     a = 1 - sigma**2 / (sigma**2 + mpf("0.33")) / 2
     b = mpf("0.45") * sigma**2 / (sigma**2 + mpf("0.09"))
@@ -87,7 +87,7 @@ def oren_nayar(l: Vector, v: Vector, diffuse: Any, sigma: Any) -> Any:
 
 
 def oren_nayar_full(l: Vector, v: Vector, diffuse: Any, sigma: Any) -> Any:
-    """Oren & Nayar (1994), eq. 27 to 29."""
+    """Oren & Nayar (1994), C1, C2, C3 and the second bounce."""
     alpha, beta, c = _polar(l, v)
     s = sigma**2
     c1 = 1 - s / (s + mpf("0.33")) / 2
@@ -105,7 +105,7 @@ def _lafortune_lobe(l: Vector, v: Vector, tilt: Any, exponent: Any) -> Any:
 
 
 def lafortune(l: Vector, v: Vector, diffuse: Any, **lobes: Any) -> Any:
-    """Lafortune et al. (1997), eq. 9."""
+    """Schwenk (2011), eq. 45."""
     out = diffuse / mp.pi
     for end in ("", "_1", "_2", "_3"):
         if "tilt" + end in lobes:
@@ -158,7 +158,7 @@ def schwenk(l: Vector, v: Vector, diffuse: Any, specular: Any, smoothness: Any, 
 
 
 def distribution_based(l: Vector, v: Vector, diffuse: Any, specular: Any, f0: Any, **p: Any) -> Any:
-    """Ashikhmin & Premoze (2007), eq. 5, with ln p by de Boor's recursion for a uniform cubic B-spline."""
+    """Ashikhmin & Premoze (2007), with ln p by de Boor's recursion for a uniform cubic B-spline."""
     hx, hy, _ = _half(l, v)
     width2 = mpf(0.002) ** 2  # the float64 number: it is a constant of the model
     c = [mpf(0), *(p[f"p_{k}"] for k in range(1, 12))]
@@ -220,7 +220,7 @@ def _cook(ior: Any, c: Any) -> Any:
 
 
 def _wave(l: Vector, v: Vector, sigma: Any, tau: Any) -> Any:
-    """G D/(pi n.l n.v) of He et al. (1991), eq. 76 to 78 and 83, lambda = 1: v = k (k_r - k_i), k_i = -l, k_r = v."""
+    """G D/(pi n.l n.v) of He et al. (1991), eq. 76 to 79, lambda = 1: v = k (k_r - k_i), k_i = -l, k_r = v."""
     k = 2 * mp.pi
     x, y, z = (k * (a + b) for a, b in zip(l, v, strict=True))
     g = (k * sigma * (l[2] + v[2])) ** 2
@@ -248,21 +248,21 @@ def _effective(ki: Any, ko: Any, sigma: Any) -> Any:
 
 
 def htsg(l: Vector, v: Vector, diffuse: Any, specular: Any, ior: Any, sigma: Any, tau: Any) -> Any:
-    """He et al. (1991), eq. 71, without the specular term."""
+    """The two diffuse terms of He et al. (1991)."""
     (si, ki), (so, ko) = (_smith(w[2], sigma, tau) for w in (l, v))
     f = _cook(ior, _dot(l, _half(l, v)))
     return diffuse / mp.pi + specular * f * si * so * _wave(l, v, _effective(ki, ko, sigma), tau)
 
 
 def htsg_mirror(l: Vector, specular: Any, ior: Any, sigma: Any, tau: Any) -> Any:
-    """The specular term of He et al. (1991), eq. 72, without its delta function."""
+    """The specular term of He et al. (1991), without its delta function."""
     s, k = _smith(l[2], sigma, tau)
     g = (4 * mp.pi * _effective(k, k, sigma) * l[2]) ** 2
     return specular * _cook(ior, l[2]) * mp.exp(-g) * s * s
 
 
 def stam(l: Vector, v: Vector, diffuse: Any, specular: Any, sigma: Any, tau: Any, ior: Any) -> Any:
-    """Stam (1999), eq. 9 and 15: F (1 + l.v)^2/(n.l + n.v)^2/(n.l n.v) times the transform of the surface over its area."""
+    """Stam (1999): F (1 + l.v)^2/(n.l + n.v)^2/(n.l n.v) times the transform of the surface over its area."""
     k = 2 * mp.pi
     g = (k * sigma * (l[2] + v[2])) ** 2
     u2 = k**2 * ((l[0] + v[0]) ** 2 + (l[1] + v[1]) ** 2)

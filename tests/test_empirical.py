@@ -159,6 +159,19 @@ def test_mirror_term():
             np.testing.assert_allclose(got, want, rtol=1e-11)
 
 
+def test_waves_become_facets():
+    """For sigma -> infinity at a given slope m = 2 sigma/tau, HTSG is F S D/(4 n.l n.v) with Beckmann's D, to 1/g."""
+    sigma, m, theta = 30.0, 0.3, np.radians([[0, 5, 20, 40], [0, 10, 30, 30]])
+    light, viewer = (np.stack([s * np.sin(t), 0 * t, np.cos(t)], -1) for s, t in ((1, theta[0]), (-1, theta[1])))
+    half = (light + viewer) / np.linalg.norm(light + viewer, axis=-1, keepdims=True)
+    cos2 = half[:, 2] ** 2
+    beckmann = np.exp(-(1 / cos2 - 1) / m**2) / (np.pi * m**2 * cos2**2)
+    with jax.enable_x64(True):
+        waves = models.model("htsg", diffuse=0.0, specular=1.0, ior=1e6, sigma=sigma, tau=2 * sigma / m)
+        got = np.asarray(waves(light, viewer))[:, 0]
+    np.testing.assert_allclose(got, beckmann / (4 * light[:, 2] * viewer[:, 2]), rtol=5e-3)  # S: 3e-3 at 40 degrees
+
+
 def test_series():
     """The sum that HTSG and Stam share, over the corners of its two arguments, against 500 and more term-by-term sums."""
     g, t = np.meshgrid(np.geomspace(1e-12, 3e3, 27), [0, *np.geomspace(1e-8, 1e5, 18)])

@@ -10,7 +10,7 @@ from ...special import sine
 
 
 def oren_nayar(albedo: Float[Array, ""], sigma: Float[Array, ""], g: Geometry) -> Float[Array, "..."]:
-    """albedo/pi (A + B max(0, cos(phi_i - phi_o)) sin(alpha) tan(beta)), in 1/sr (Oren & Nayar 1994, eq. 30).
+    """albedo/pi (A + B max(0, cos(phi_i - phi_o)) sin(alpha) tan(beta)), in 1/sr (Oren & Nayar 1994).
 
     A = 1 - sigma^2/(2 (sigma^2 + 0.33)), B = 0.45 sigma^2/(sigma^2 + 0.09); alpha is the larger and beta the smaller of the
     polar angles, so that cos sin tan = (l_x v_x + l_y v_y)/max(n.l, n.v), which needs no azimuth at normal incidence.
@@ -21,7 +21,7 @@ def oren_nayar(albedo: Float[Array, ""], sigma: Float[Array, ""], g: Geometry) -
 
 
 def oren_nayar_full(albedo: Float[Array, ""], sigma: Float[Array, ""], g: Geometry) -> Float[Array, "..."]:
-    """The functional approximation of the whole model with one interreflection, in 1/sr (Oren & Nayar 1994, eq. 27 to 29).
+    """The functional approximation of the whole model with one interreflection, in 1/sr (Oren & Nayar 1994).
 
     With c = cos(phi_i - phi_o), alpha the larger and beta the smaller polar angle, and s = sigma^2:
 
