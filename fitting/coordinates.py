@@ -155,7 +155,22 @@ def _composed_chart(cls: type[Composition], narrow: bool = True) -> Chart:
     chart = replace(chart, coordinates=coordinates)
     if {"alpha", "gamma"} <= {c.name for c in coordinates}:
         chart = _with_tail(chart, narrow)
+    if "second_lobe" in cls.effects and not {"tail", "anisotropy", "dispersion"} & set(cls.effects):
+        chart = _with_order(chart)
     return _with_trade_off(chart, "second_lobe" in cls.effects) if "trade_off" in cls.effects else chart
+
+
+def _with_order(chart: Chart) -> Chart:
+    """The second lobe by how much wider it is than the first: two lobes of one kind could change places."""
+
+    def to_parameters(x: Scalars) -> Scalars:
+        p = chart.to_parameters(x)
+        return {**p, "alpha_2": p["alpha_2"] * p["alpha"]}
+
+    def from_parameters(p: Scalars) -> Scalars:
+        return chart.from_parameters({**p, "alpha_2": p["alpha_2"] / p["alpha"]})
+
+    return _rewritten(chart, to_parameters, from_parameters, alpha_2=(0.0, float(np.log(1e10))))
 
 
 def _with_tail(chart: Chart, narrow: bool) -> Chart:

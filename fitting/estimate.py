@@ -110,8 +110,14 @@ def judge(problem: Problem, x: Reals, box: Box, losses: tuple[Loss, ...]) -> Jud
     return Judgement(estimate, np.sqrt(found.sums[:, 0] / found.sums[:, 1]), u.shift, u.gain)
 
 
+def make_ready(problem: Problem, losses: tuple[Loss, ...]) -> None:
+    """Compile what :func:`judge` will run, in a thread, by a pass over no blocks."""
+    x = np.zeros(problem.size)
+    in_threads(lambda span: _statistics(problem, x, losses, span), [Span(np.asarray(0), np.asarray(0))])
+
+
 def _label(row: tuple[str, int | None]) -> str:
     return row[0] if row[1] is None else f"{row[0]}[{row[1]}]"
 
 
-__all__ = ["Estimate", "Judgement", "judge"]
+__all__ = ["Estimate", "Judgement", "judge", "make_ready"]

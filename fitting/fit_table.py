@@ -20,7 +20,7 @@ from ..programs import program
 from ..tables import Table
 from .coordinates import Chart, charts
 from .effort import DEFAULT, Effort
-from .estimate import Judgement, judge
+from .estimate import Judgement, judge, make_ready
 from .gram import Problem, Span, loss_errors
 from .losses import LOSSES, Loss, LossFunction, named_loss
 from .plan import RUNGS, plan
@@ -225,6 +225,7 @@ def _fit(
             proposals.insert(0, {**proposals[0], **_per_channel(cls, given, table.channels)})
         proposals = [{**p, **_per_channel(cls, held, table.channels)} for p in proposals]
         named = ready.losses
+        make_ready(Problem(ready.samples, bound_loss, forms[0]), named)
         found = _search(forms, ready.samples, bound_loss, proposals, frozenset(held), effort)
         found, judged = settle(found, Problem(ready.samples, bound_loss, found[0].problem.chart), named, effort)
         errors = judged.errors

@@ -2,18 +2,29 @@
 
 from __future__ import annotations
 
+import math
+import time
 from collections.abc import Iterator
 from contextlib import contextmanager
 from contextvars import ContextVar
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from functools import cache
 
 
 @dataclass
 class Compilation:
-    """Seconds of tracing, lowering and compiling."""
+    """When threads were tracing, lowering and compiling."""
 
-    seconds: float = 0.0
+    spans: list[tuple[float, float]] = field(default_factory=list)
+
+    @property
+    def seconds(self) -> float:
+        """Time in which any of them was."""
+        total, until = 0.0, -math.inf
+        for begin, end in sorted(self.spans):
+            total += max(0.0, end - max(begin, until))
+            until = max(until, end)
+        return total
 
 
 _current: ContextVar[Compilation | None] = ContextVar("compilation", default=None)
@@ -26,7 +37,8 @@ def _listen() -> None:
     def record(event: str, duration_secs: float, **kwargs: str | int) -> None:
         current = _current.get()
         if current is not None and event.startswith("/jax/core/compile"):
-            current.seconds += duration_secs
+            now = time.perf_counter()
+            current.spans.append((now - duration_secs, now))
 
     jax.monitoring.register_event_duration_secs_listener(record)
 
