@@ -252,6 +252,12 @@ NDFS: dict[str, tuple[Callable[..., Any], tuple[tuple[float, ...], ...]]] = {
     "ABC": (ndf.ABC, ((200.0, 1.3), (8.1e6, 2.67), (11.0, 0.024), (1e-4, 1.0), (50.0, 2.0))),
     "power_cosine": (ndf.power_cosine, ((0.0,), (100.0,), (6.2e5,))),
     "gaussian": (ndf.gaussian, ((0.15,), (1e-3,), (1.0,))),
+    "GGX": (ndf.GGX, ((0.2,), (1e-4,), (3.0,))),
+    "Beckmann": (ndf.Beckmann, ((0.2,), (1e-4,), (30.0,))),
+    "Blinn": (ndf.Blinn, ((0.0,), (100.0,), (6e5,))),
+    "GaussianAngles": (ndf.GaussianAngles, ((0.2,), (1e-4,), (30.0,))),
+    "EPD": (ndf.EPD, ((0.2, 1.0), (0.2, 0.3), (1e-3, 0.7), (0.5, 1.2))),
+    "StudentT": (ndf.StudentT, ((0.2, 2.0), (0.2, 1.55), (1e-3, 1.9), (3.0, 4.0), (0.3, 100.0))),
 }
 """Densities of theta_m with parameter sets; see test_ndf.py for what each is normalised to."""
 
@@ -259,7 +265,28 @@ ANISOTROPIC_NDFS = {"power_cosine_anisotropic": "power_cosine", "anisotropic_gau
 """Each with the isotropic density that it equals for equal widths."""
 
 PARTS = {
-    masking: {"averted_area", "smith_correlated", "smith_lambda", "smith_separable", "vcavity"},
-    fresnel: {"dielectric", "dielectric_f0", "schlick", "sgd_fresnel"},
+    masking: {
+        "averted_area",
+        "half_vector",
+        "hammon",
+        "kelemen",
+        "schlick_smith",
+        "walter_correlated",
+        "walter_separable",
+        "smith_correlated",
+        "smith_lambda",
+        "smith_separable",
+        "vcavity",
+    },
+    fresnel: {
+        "conductor",
+        "dielectric",
+        "dielectric_at",
+        "lazanyi",
+        "schlick_ior",
+        "dielectric_f0",
+        "schlick",
+        "sgd_fresnel",
+    },
 }
-"""Parts with a test of their own, in test_masking.py and in test_fresnel of test_models.py, by package."""
+"""Parts with a test of their own, by package: in test_masking.py, test_microfacet_models.py and test_fresnel of test_models.py."""

@@ -17,6 +17,7 @@ from brdfit.stability import oracle
 from . import cases
 from .cases import TABLE, WI, WO, Row
 from .empirical_cases import EMPIRICAL
+from .microfacet_cases import MICROFACETS
 
 rows = pytest.mark.parametrize("row", TABLE, ids=lambda r: r.name)
 
@@ -50,7 +51,7 @@ def slopes(row: Row, wi: np.ndarray, wo: np.ndarray, dtype: type = np.float64) -
 
 
 def test_every_model_has_cases():
-    assert {r.model for r in (*TABLE, *EMPIRICAL)} == {v for variants in MODELS.values() for v in variants}
+    assert {r.model for r in (*TABLE, *EMPIRICAL, *MICROFACETS)} == {v for variants in MODELS.values() for v in variants}
     assert {r.name for r in TABLE} == set(oracle.MODELS)
     for r in TABLE:
         for case in r.cases:
@@ -184,13 +185,17 @@ def test_eager_is_jit_is_vmap(row: Row):
 @pytest.mark.parametrize("name", [n for n, v in MODELS.items() if len(v) > 1])
 def test_anisotropic_with_equal_widths(name: str):
     """Equals the isotropic form, to the rounding of exponents of up to 700."""
-    round_row, long_row = (next(r for r in TABLE if r.model is v) for v in MODELS[name])
-    rounds = {p.name for p in parameters_of(round_row.model)}
-    (width,) = rounds - {p.name for p in parameters_of(long_row.model)}
-    split = [
-        {**{k: v for k, v in c.items() if k != width}, f"{width}_x": c[width], f"{width}_y": c[width]}
-        for c in round_row.cases
-    ]
+    round_row, long_row = (next(r for r in (*TABLE, *MICROFACETS) if r.model is v) for v in MODELS[name])
+    rounds, longs = ({p.name for p in parameters_of(r.model)} for r in (round_row, long_row))
+    if longs > rounds:  # a parameter that stretches the lobe
+        (stretch,) = longs - rounds
+        split = [{**c, stretch: 0.0} for c in round_row.cases]
+    else:
+        (width,) = rounds - longs
+        split = [
+            {**{k: v for k, v in c.items() if k != width}, f"{width}_x": c[width], f"{width}_y": c[width]}
+            for c in round_row.cases
+        ]
     same = Row(long_row.model, tuple(split), 0)
     np.testing.assert_allclose(evaluate(same, WI, WO), evaluate(round_row, WI, WO), rtol=1e-12, atol=1e-290)
 

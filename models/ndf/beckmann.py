@@ -35,7 +35,7 @@ class Beckmann(eqx.Module):
 
     def averted_area(self, cosine: Float[Array, "..."]) -> Float[Array, "..."]:
         """n.v Lambda(v) = (alpha sin exp(-a^2)/sqrt(pi) - cos erfc(a))/2, a = cos/(alpha sin) (Heitz 2014, eq. 66)."""
-        # Guard: 1/0 at normal incidence, and the slope of the sine (tests/test_masking.py::test_closed_forms).
+        # Guard: 1/0 at normal incidence, and the slope of the sine (tests/test_microfacet_models.py::test_own_masking).
         sin2 = (1 - cosine) * (1 + cosine)
         unseen = cosine * cosine > _GONE * jax.lax.stop_gradient(self.alpha) ** 2 * sin2
         across = self.alpha * jnp.sqrt(jnp.where(unseen, 1, sin2))

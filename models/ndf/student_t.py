@@ -58,7 +58,7 @@ class StudentT(eqx.Module):
         w = self.gamma - 1
         scale = self.alpha * jnp.sqrt(w)
         # Guard: 1/0 at normal incidence, where for gamma < 2 the slope is infinite: large there
-        # (tests/test_masking.py::test_closed_forms).
+        # (tests/test_microfacet_models.py::test_own_masking).
         sine = jnp.sqrt((1 - cosine) * (1 + cosine) + (1e-12 if cosine.dtype == jnp.float32 else 1e-30))
         z0 = cosine / (scale * sine)
         k = gamma_ratio(w) / jnp.sqrt(jnp.pi)
