@@ -38,7 +38,7 @@ def sampled(
 
     ``alpha`` is the width of the GGX lobe that directions are drawn from: a matter of noise, not of the mean.
     """
-    techniques = 2 + len(light.balls) + (light.sky is not None)
+    techniques = techniques_of(light)
 
     def batch(k: Array) -> Array:
         shift = jax.random.uniform(k, (techniques, 2, len(wo)), wo.dtype)
@@ -55,16 +55,30 @@ def sampled(
 
 
 def _round(brdf: Any, light: Extended, wo: Array, alpha: Array, u: Array) -> Array:
-    """One direction of each technique, combined; ``u`` ``[techniques, 2, P]`` in [0, 1)."""
-    drawn = [draw_cosine(u[0]), draw_lobe(wo, alpha, u[1])]
-    drawn += [draw_ball(ball, u[2 + k]) for k, ball in enumerate(light.balls)]
+    """One direction of each technique, combined."""
+    wi, arriving = drawn(light, wo, alpha, u)
+    total: Array = (brdf(wi, wo) * arriving).sum(0)
+    return total
+
+
+def techniques_of(light: Extended) -> int:
+    """How many directions a round has for each pixel."""
+    return 2 + len(light.balls) + (light.sky is not None)
+
+
+def drawn(
+    light: Extended, wo: Float[Array, "P 3"], alpha: Array, u: Float[Array, "techniques 2 P"]
+) -> tuple[Float[Array, "techniques P 3"], Float[Array, "techniques P C"]]:
+    """One direction of each technique for each pixel, of ``u`` in [0, 1), and what f there is multiplied by."""
+    directions = [draw_cosine(u[0]), draw_lobe(wo, alpha, u[1])]
+    directions += [draw_ball(ball, u[2 + k]) for k, ball in enumerate(light.balls)]
     if light.sky is not None:
-        drawn.append(draw_sky(light.sky, u[-1]))
-    wi = jnp.stack(drawn)
+        directions.append(draw_sky(light.sky, u[-1]))
+    wi = jnp.stack(directions)
     cosine = jnp.maximum(wi[..., 2], 0)
     above = cosine > 0
     density = cosine / jnp.pi + lobe_density(wi, wo, alpha, above)
-    radiance = jnp.zeros((), wo.dtype) if light.constant is None else light.constant
+    radiance = jnp.zeros(1, wo.dtype) if light.constant is None else light.constant
     for ball in light.balls:
         inside = ball_holds(ball, wi)
         density = density + inside / (2 * jnp.pi * ball.vers)
@@ -75,8 +89,7 @@ def _round(brdf: Any, light: Extended, wo: Array, alpha: Array, u: Array) -> Arr
         radiance = radiance + light.sky.radiance[row, column]
     # Guard: below the horizon cosine and density may both be 0 (tests/test_scenes_sampling.py::test_below_the_horizon).
     weight = jnp.where(above, cosine / jnp.where(above, density, 1), 0)
-    total: Array = (brdf(wi, wo) * radiance * weight[..., None]).sum(0)
-    return total
+    return wi, radiance * weight[..., None]
 
 
 def draw_cosine(u: Float[Array, "2 P"]) -> Directions:
@@ -171,4 +184,4 @@ def _around(n: Directions) -> tuple[Directions, Directions]:
     return jnp.stack([1 + sign * x * x * a, sign * b, -sign * x], -1), jnp.stack([b, sign + y * y * a, -y], -1)
 
 
-__all__ = ["BATCHES", "sampled"]
+__all__ = ["BATCHES", "drawn", "sampled", "techniques_of"]

@@ -1,0 +1,135 @@
+"""A fit to what a picture shows, fast enough for a search over models: a few thousand pairs of directions, no error bars.
+
+The residual of a pair is the difference of the PQ signal of its pixel, PQ(L f/m) - PQ(L), for each channel: what the pixel
+would look like if all of its light came that way. Where one light makes a pixel, that is the difference that is seen.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, replace
+from typing import Any
+
+import equinox as eqx
+import jax
+import jax.numpy as jnp
+import numpy as np
+from jaxtyping import Array, Float
+
+from ..fitting.coordinates import Chart, charts
+from ..fitting.starts import Summary, starts
+from ..geometry import Geometry, from_directions
+from ..models import BRDF, parameter_values, parameters_of
+from ..polar import PolarStencil
+from ..programs import program
+from .scene import Reals
+from .seen import Seen, pq
+
+PAIRS = 2048
+STARTS = 4
+STEPS = 60
+RTOL = 1e-6
+"""Relative decrease of the cost in a step below which a search ends: the pictures then differ by far less than is seen."""
+LIMIT = np.pi / 2
+
+
+class Shown(eqx.Module):
+    """Pairs of directions, and what their pixels look like."""
+
+    geometry: Geometry
+    scale: Float[Array, "n C"]
+    """Shown value of the pixel for each unit of BRDF."""
+    signal: Float[Array, "n C"]
+    """PQ signal of the measured pixel."""
+
+
+@dataclass(frozen=True, eq=False)
+class Quick:
+    """An optimum."""
+
+    model: BRDF
+    error: float
+    """RMS difference of the PQ signal over pairs and channels, times 720: comparable to ΔE ITP."""
+
+
+def shown(seen: Seen) -> Shown:
+    """The pairs of a scene ready to be fitted, in float64: :data:`PAIRS` of them, whatever the scene."""
+    few = seen.draw(PAIRS)
+    with jax.enable_x64(True):
+        g: Any = from_directions(jnp.asarray(few.wi), jnp.asarray(few.wo))
+        stencils = tuple(jax.tree.map(jnp.asarray, PolarStencil.of(w[:, 2], LIMIT)) for w in (few.wi, few.wo))
+        g = replace(g, stencil_i=stencils[0], stencil_o=stencils[1])
+        scale = few.pixel / np.maximum(few.measured, 1e-9)
+        return Shown(g, jnp.asarray(scale), pq(jnp.asarray(few.pixel)))
+
+
+def quick_fit(cls: type[BRDF], data: Shown, summary: Summary, near: BRDF | None = None) -> Quick:
+    """Fit a model class. Starts are those of :func:`brdfit.fit`, and ``near``, a model with some of its parameters."""
+    from scipy.optimize import least_squares
+
+    chart = charts(cls)[0]
+    channels = data.scale.shape[1]
+    proposals = list(starts(cls, summary, 0))
+    if near is not None:
+        known = parameter_values(near)
+        proposals.insert(0, {n: known.get(n, v) for n, v in proposals[0].items()})
+    with jax.enable_x64(True):
+        at = _Linearised(data, chart)
+        begin = [chart.coordinates_of(p, channels) for p in proposals]
+        costs = [float((at.residual(x) ** 2).sum()) for x in begin]
+        order = [i for i in np.argsort(costs, kind="stable") if np.isfinite(costs[i])]
+        box = chart.box(channels)
+        ends = [
+            least_squares(
+                at.residual, begin[i], at.jacobian, box, x_scale="jac", ftol=RTOL, xtol=RTOL, gtol=None, max_nfev=STEPS
+            )
+            for i in order[:STARTS]
+        ]
+        best = min(ends, key=lambda end: end.cost)
+        own, shared = chart.split(jnp.asarray(best.x), channels)
+        values = [chart.parameters(list(o), list(shared)) for o in own]
+        parameters = {
+            p.name: np.array([float(v[p.name]) for v in values]) if p.per_channel else np.asarray(float(values[0][p.name]))
+            for p in parameters_of(cls)
+        }
+    return Quick(cls(**parameters), 720 * float(np.sqrt(2 * best.cost / data.scale.size)))
+
+
+class _Linearised:
+    """Residual and Jacobian by one program, evaluated once for each point.
+
+    Both by the triangular factor of [J r], a dozen rows in place of thousands: r.r, J^T J and J^T r are the same (as in
+    :mod:`brdfit.fitting.gram`), and nothing else of them is used.
+    """
+
+    def __init__(self, data: Shown, chart: Chart) -> None:
+        self.data, self.chart, self.last = data, chart, np.zeros(0)
+
+    def _at(self, x: Reals) -> Reals:
+        if not np.array_equal(x, self.last):
+            self.last, self.factor = x.copy(), np.asarray(_linearise(self.data, x, self.chart))
+        return self.factor
+
+    def residual(self, x: Reals) -> Reals:
+        return self._at(x)[:, -1]
+
+    def jacobian(self, x: Reals) -> Reals:
+        return self._at(x)[:, :-1]
+
+
+@program
+def _linearise(data: Shown, x: Array, chart: Chart) -> Array:
+    def residual(x: Array) -> tuple[Array, Array]:
+        own, shared = chart.split(x, data.scale.shape[1])
+        models = [chart.model(list(o), list(shared)) for o in own]
+        f = jnp.stack([jnp.broadcast_to(m.evaluate(data.geometry), data.scale.shape[:1]) for m in models], -1)
+        r = (pq(jnp.maximum(f * data.scale, 0)) - data.signal).ravel()
+        return r, r
+
+    jacobian, r = jax.jacfwd(residual, has_aux=True)(x)
+    both = jnp.concatenate([jacobian, r[:, None]], 1)
+    # a model beyond what numbers hold is as bad as can be, and has no slope
+    worst = jnp.where(jnp.arange(both.shape[1]) < len(x), 0.0, 1e3)
+    return jnp.linalg.qr(jnp.where(jnp.isfinite(both), both, worst), mode="r")
+
+
+__all__ = ["Quick", "Shown", "quick_fit", "shown"]
