@@ -50,7 +50,7 @@ class MissingEnergy(eqx.Module):
     @staticmethod
     def of(facets: Any) -> MissingEnergy:
         """Of a GTR or GGX lobe."""
-        lobe = ndf.GTR(facets.alpha, getattr(facets, "gamma", jnp.asarray(2.0, jnp.result_type(facets.alpha))))
+        lobe = facets if isinstance(facets, ndf.GTR) else _GGX(facets.alpha)
         dtype = jnp.result_type(lobe.alpha)
         nodes, matrix = _interpolation()
         a = jnp.minimum(1, 2 * averted_area(facets, jnp.asarray(1e-4, dtype)))
@@ -79,7 +79,19 @@ class MissingEnergy(eqx.Module):
         return jnp.sum(2 * weight * end * self.width * jnp.cosh(end * x) * cosine * self(cosine))
 
 
-def _missing(facets: Any, lobe: ndf.GTR, cosine: Float[Array, " n"]) -> Float[Array, " n"]:
+class _GGX(ndf.GGX):
+    """With what :class:`ndf.GTR` has for any gamma."""
+
+    def cumulative(self, sin2: Array, cos2: Array) -> tuple[Array, Array]:
+        near, far = sin2, self.alpha**2 * cos2
+        return near / (near + far), far / (near + far)
+
+    def quantile(self, share: Array, rest: Array) -> tuple[Array, Array]:
+        sin2 = self.alpha**2 * share
+        return sin2 / (sin2 + rest), rest / (sin2 + rest)
+
+
+def _missing(facets: Any, lobe: ndf.GTR | _GGX, cosine: Float[Array, " n"]) -> Float[Array, " n"]:
     dtype = cosine.dtype
     x, wx = (jnp.asarray(a, dtype) for a in gauss_legendre(FACETS))
     y, wy = gauss_legendre(AZIMUTHS)
