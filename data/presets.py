@@ -41,7 +41,7 @@ def published_fits(material: str) -> dict[str, BRDF]:
 
 def published_start(name: str, material: str) -> dict[str, NDArray[np.float64]] | None:
     """Parameters of the published fit of the named model to a material; None if there is none."""
-    form = _STARTS.get(name)
+    form = STARTS.get(name)
     if form is None or material not in published_materials(form):
         return None
     start = published_sgd_smith(material) if form == "sgd" else preset(form, material)
@@ -171,7 +171,7 @@ _PRESETS: dict[str, Callable[[Row], BRDF]] = {
     "ngan_wardduer": _ngan(_ward("ward_duer")),
 }
 
-_STARTS = {
+STARTS = {
     "abc": "abc",
     "sgd": "sgd",
     "abc_smooth": "low_lowsmooth_E2",

@@ -289,4 +289,4 @@ PARTS = {
         "sgd_fresnel",
     },
 }
-"""Parts with a test of their own, by package: in test_masking.py, test_microfacet_models.py and test_fresnel of test_models.py."""
+"""Parts with a test of their own, by package: in test_masking.py, test_microfacet_models.py and test_models.py."""
