@@ -7,7 +7,7 @@ from .factory import named
 _COMMON = """
 
     Divisor 4 in place of the pi of Cook & Torrance (1982), eq. 2; Schlick's Fresnel in place of theirs.
-    Reciprocal. The lobe's albedo stays below specular times 1 at all angles; the value is unbounded towards grazing. Has
+    Reciprocal. The albedo of the lobe is at most 1 for specular <= 1; that of the sum need not be. Has
     kinks where two of the three terms of G are equal.
 """
 

@@ -61,15 +61,15 @@ def named(
         ("fresnel", f_name, FRESNELS),
         ("body", b_name, BODIES),
     ):
-        if given not in known:  # type: ignore[operator]
-            raise ValueError(f"unknown {kind} {given!r}: choose from {', '.join(known)}")  # type: ignore[arg-type]
+        if given not in known:
+            raise ValueError(f"unknown {kind} {given!r}: choose from {', '.join(known)}")
     distribution, masking, fresnel = NDFS[d_name], MASKINGS[m_name], FRESNELS[f_name]
     before, body_parameters = BODIES[b_name]
     if masking.needs_alpha and "alpha" not in distribution.parameters:
         raise ValueError(f"masking {m_name!r} needs a distribution with a width alpha, and {d_name!r} has none")
     formula = f"f = {before}F D G/(4 n.l n.v); {distribution.formula}; {masking.formula}; {fresnel.formula}."
     sources = (*references, *distribution.references, *masking.references, *fresnel.references)
-    return assemble(
+    cls = assemble(
         name,
         {**body_parameters, **fresnel.parameters, **distribution.parameters},
         Composition.evaluate,
@@ -80,6 +80,8 @@ def named(
         blocks=blocks,
         shapes=_SHAPES,
     )
+    assert issubclass(cls, Composition)
+    return cls
 
 
 @cache

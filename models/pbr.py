@@ -11,8 +11,11 @@ PBR = named(
 
     Options, by ``brdfit.microfacet(ndf, masking, "schlick", "transmitted")``: "ggx" with masking "smith",
     "smith_separable", or the approximations "hammon" (correlated) and "schlick_smith" (separable); "beckmann" with "smith",
-    "smith_separable", "walter" and "walter_separable". Reciprocal. 1 - F is taken at the half vector, so what the body gets
-    is not what the lobe transmits: for diffuse = specular = 1 the albedo is 1 in the furnace of a mirror (alpha -> 0) at
-    normal incidence only. Known failure: diffuse and specular trade off where F0 is large.
+    "smith_separable", "walter" and "walter_separable".
+
+    Reciprocal. 1 - F is taken at the half vector, so what the body gets is not what the lobe leaves: diffuse = 1 with
+    specular = 0 returns 1.03 at 60 degrees, 1.34 at 80 and 1.64 at grazing
+    (tests/test_microfacet_models.py::test_energy_of_models). Known failure: diffuse and specular trade off where F0 is
+    large.
     """,
 )

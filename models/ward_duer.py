@@ -18,7 +18,8 @@ class WardDuer(BRDF):
     """f = diffuse/pi + specular exp(-tan^2(theta_h)/alpha^2) / (4 pi alpha^2 n.l n.v) (Dür 2006).
 
     Ward (1992) has sqrt(n.l n.v) in its divisor and so loses energy towards grazing. Reciprocal. Does not conserve energy:
-    ALBEDO
+    towards grazing the albedo of the lobe rises as 0.085 specular/n.l at alpha = 0.72, to 1.3 specular at 85 degrees
+    and 5.1 at 89 (tests/test_microfacet_models.py::test_energy_of_models).
     """
 
     name: ClassVar[str] = "ward_duer"

@@ -21,6 +21,7 @@ from brdfit.stability.oracle import DIGITS, dielectric, mp, mpf, schlick
 
 from .cases import WI, WO
 from .test_empirical import small_grid
+from .test_energy import albedo
 
 GEOMETRY_CASES = range(0, len(WI), 3)
 
@@ -221,3 +222,31 @@ def test_composed_model_fits_and_saves():
     for parameter, value in truth.items():
         np.testing.assert_allclose(fit.parameters[parameter], value, rtol=1e-6)
     assert isinstance(from_record(fit.record()).model, models.variants(name)[0])
+
+
+def test_energy_of_models():
+    """What their docstrings say they return, by quadrature over half vectors."""
+
+    def most(name: str, angle: float, **sets: Any) -> float:
+        return float(albedo(models.MODELS[name][0], angle, (96, 48), **sets).max())
+
+    alpha = np.array([0.03, 0.3, 0.5, 0.72, 1.0])
+    lobe = {"diffuse": 0.0, "specular": 1.0}
+    for angle in (0.0, 60.0, 85.0):
+        for name in ("ggx", "beckmann", "cook_torrance", "cook_torrance_gaussian", "ward_bounded"):
+            assert most(name, angle, **lobe, alpha=alpha) <= 1 + 1e-5, (name, angle)  # 1e-5: what the rule leaves out
+    grows = [most("ward_duer", angle, **lobe, alpha=alpha) for angle in (85.0, 89.0, 89.9)]
+    assert grows == pytest.approx([1.33, 5.15, 0.085 / np.cos(np.radians(89.9))], rel=0.02)
+    body = [most("pbr", angle, diffuse=1.0, specular=0.0, alpha=alpha) for angle in (60.0, 80.0, 89.995)]
+    assert body == pytest.approx([1.03, 1.34, 1.64], abs=0.01)
+    paint = {
+        "base_color": 1.0,
+        "subsurface": 0.0,
+        "metallic": 0.0,
+        "specular": 1.0,
+        "roughness": 1.0,
+        "clearcoat_gloss": 0.0,
+    }
+    coats = {"sheen": np.array([0.0, 1.0]), "clearcoat": np.array([0.0, 1.0])}
+    found = albedo(models.MODELS["disney"][0], 89.9, (96, 48), **paint, **coats)
+    assert found == pytest.approx([1.62, 1.76], abs=0.01)
