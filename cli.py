@@ -309,6 +309,32 @@ def tradeoff_command(
     return OK if all(f.converged for f in result.fits) else SOME_FAILED
 
 
+@commands.command("scene")
+@click.argument("scene_file", metavar="SCENE.toml")
+@click.argument("file", metavar="FILE")
+@click.option("--out", "out_dir", required=True, metavar="DIR", help="Where scene.html and scene.json go.")
+@click.option("--exr", is_flag=True, help="Write the pictures as DIR/scene.exr, too.")
+@_angles
+@click.option("--quiet", is_flag=True, help="Print nothing.")
+def scene_command(scene_file: str, file: str, out_dir: str, exr: bool, angles: Any, quiet: bool) -> int:
+    """Find which effects of the material in FILE the scene shows, and the cheapest model that does."""
+    from .progress import Progress
+    from .tables import load
+
+    _keep_programs()
+    from .scenes import PIECES, load_scene, study, write_scene
+
+    scene = load_scene(scene_file)
+    table = load(file, angles=angles)
+    out = _writable(out_dir)
+    with Progress(PIECES, silent=quiet) as progress:
+        found = study(table, scene, progress)
+    page = write_scene(out, found, exr)
+    if not quiet:
+        click.echo(f"scene: {page}")
+    return OK if found.choice.met else SOME_FAILED
+
+
 def _checked_names(models: str, loss: str) -> list[str]:
     """The models of a list with commas, once each. Raises UsageError for an unknown name of a model or loss."""
     from .fitting.losses import LOSSES

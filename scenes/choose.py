@@ -128,7 +128,7 @@ def larger(effects: Effects, among: Iterable[str]) -> list[Effects]:
 def choose(bench: Bench, tolerance: Tolerance, budget: float | None, among: Sequence[str]) -> Choice:
     """Search forward until the tolerance is met, then backward for what can be left out.
 
-    Forward, the effect whose addition lowers the error of the fit most is added. Where that stalls, everything is taken.
+    Forward, the effect whose addition lowers the error of the fit most is added. Where that stalls, everything is tried.
     Backward, the effect is dropped whose loss leaves the cheapest model that still meets the tolerance. Of all sets met on
     the way that do, the cheapest is chosen, and one that is within the budget if there is one.
     """
@@ -148,17 +148,18 @@ def choose(bench: Bench, tolerance: Tolerance, budget: float | None, among: Sequ
         return [known[s] for s in sets]
 
     singles = [s for n in among if possible(s := frozenset([n]))]
-    everything, *first = explore([frozenset(among), *singles])
-    here = min(first, key=lambda t: t.fit_error)
+    here = min(explore(singles), key=lambda t: t.fit_error)
     for _ in among:
         if tolerance.met(here.error):
             break
         wider = explore(larger(frozenset(here.effects), among), here.model)
         best = min(wider, key=lambda t: t.fit_error, default=here)
         if best.fit_error > (1 - STALLED) * here.fit_error or best is here:
-            here = everything
             break
         here = best
+    everything = explore([frozenset(among)], here.model, pictures=True)[0]
+    if not tolerance.met(here.error) and tolerance.met(everything.error):
+        here = everything
     for _ in among:
         less = explore(smaller(frozenset(here.effects)), here.model, pictures=True)
         good = [t for t in less if tolerance.met(t.error)]

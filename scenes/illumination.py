@@ -31,7 +31,7 @@ class Everywhere(eqx.Module):
     """The same radiance from everywhere, and the rule by which the albedo of a material is integrated.
 
     albedo(theta_o) = int f cos_i dwi at 64 polar angles, interpolated at those of the pixels: accurate to the quadrature
-    (half vectors, crowded where narrow lobes are), whose error :func:`brdfit.scenes.ambient_error` states.
+    (half vectors, crowded where narrow lobes are), whose error :func:`brdfit.reports.physics.directional_albedo` states.
     """
 
     radiance: Float[Array, " C"]

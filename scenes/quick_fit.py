@@ -16,6 +16,7 @@ import numpy as np
 from jaxtyping import Array, Float
 
 from ..fitting.coordinates import Chart, charts
+from ..fitting.result import Named
 from ..fitting.starts import Summary, starts
 from ..geometry import Geometry, from_directions
 from ..models import BRDF, parameter_values, parameters_of
@@ -26,7 +27,9 @@ from .seen import Seen, pq
 
 PAIRS = 2048
 STARTS = 4
-STEPS = 60
+NEARBY = 2
+"""Starts that are polished where a model with one effect less or more says where to look."""
+STEPS = 40
 RTOL = 1e-6
 """Relative decrease of the cost in a step below which a search ends: the pictures then differ by far less than is seen."""
 LIMIT = np.pi / 2
@@ -71,7 +74,7 @@ def quick_fit(cls: type[BRDF], data: Shown, summary: Summary, near: BRDF | None 
     proposals = list(starts(cls, summary, 0))
     if near is not None:
         known = parameter_values(near)
-        proposals.insert(0, {n: known.get(n, v) for n, v in proposals[0].items()})
+        proposals = [_moved(p, known) for p in proposals[:NEARBY]] + proposals
     with jax.enable_x64(True):
         at = _Linearised(data, chart)
         begin = [chart.coordinates_of(p, channels) for p in proposals]
@@ -82,7 +85,7 @@ def quick_fit(cls: type[BRDF], data: Shown, summary: Summary, near: BRDF | None 
             least_squares(
                 at.residual, begin[i], at.jacobian, box, x_scale="jac", ftol=RTOL, xtol=RTOL, gtol=None, max_nfev=STEPS
             )
-            for i in order[:STARTS]
+            for i in order[: STARTS if near is None else NEARBY]
         ]
         best = min(ends, key=lambda end: end.cost)
         own, shared = chart.split(jnp.asarray(best.x), channels)
@@ -92,6 +95,15 @@ def quick_fit(cls: type[BRDF], data: Shown, summary: Summary, near: BRDF | None 
             for p in parameters_of(cls)
         }
     return Quick(cls(**parameters), 720 * float(np.sqrt(2 * best.cost / data.scale.size)))
+
+
+def _moved(start: Named, known: Named) -> Named:
+    """A start with the parameters that are known, in the shapes that it has them."""
+    out = {}
+    for name, value in start.items():
+        given = known.get(name, value)
+        out[name] = np.broadcast_to(given if np.ndim(given) <= np.ndim(value) else given.mean(), np.shape(value))
+    return out
 
 
 class _Linearised:

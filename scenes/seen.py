@@ -100,9 +100,7 @@ def seen(table: Measured, light: Illumination, picture: Rendered, exposure: floa
     return Seen(wi[kept], wo[kept], values[kept], pixel[at][kept], weight[kept] / (total if total > 0 else 1.0))
 
 
-def _fewer(
-    light: Extended, wo: Any, every: NDArray[np.intp], rng: np.random.Generator
-) -> tuple[Extended, NDArray[np.intp]]:
+def _fewer(light: Extended, wo: Any, every: NDArray[np.intp], rng: np.random.Generator) -> tuple[Extended, NDArray[np.intp]]:
     """The light on a random part of the pixels, so that no more than :data:`LARGEST` pairs are made."""
     count = min(len(every), max(LARGEST // (ROUNDS * techniques_of(light)), 1))
     part = np.sort(rng.choice(every, count, replace=False))

@@ -35,6 +35,8 @@ MEAN = 0.8
 """What the mean of a white Lambertian surface is shown as, where a scene does not set its exposure."""
 FITTED_ANGLE = np.radians(80)
 """Cells within this polar angle say where fits start."""
+DEAR = frozenset({"interreflection", "dispersion"})
+"""Effects that a search leaves out: beside others their fits take longer than all the rest of it."""
 TIMED = 8192
 REPEATS, BUDGET = 5, 1.0
 
@@ -84,7 +86,7 @@ def study(table: Table, scene: Scene, progress: Progress | None = None) -> Study
     summary = summarise(table, used if used.any() else table.mask)
     bench = _Bench(scene, pixels, light, exposure, alpha, reference, shown(visible), summary, visible)
     progress.say("searching")
-    among = [n for n in EFFECTS if n != "anisotropy" or not table.isotropic]
+    among = [n for n in EFFECTS if n not in DEAR and (n != "anisotropy" or not table.isotropic)]
     choice = choose(bench, scene.tolerance, scene.budget, among)
     progress.advance(f"{choice.chosen.label}: {MEASURES[scene.tolerance.measure][1]} {choice.chosen.error:.3g}")
     both = {"chosen": choice.chosen, "everything": choice.everything}

@@ -1,0 +1,271 @@
+"""A study as files: scene.json with all figures, scene.html for a reader, and the pictures as scene.exr on request."""
+
+from __future__ import annotations
+
+import json
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+from ..angles import half_difference
+from ..environment import environment
+from ..files import StrPath, replacing
+from ..models import parameter_values
+from ..models.effects import EFFECTS
+from ..reports.words import listed, minus, percent, seconds, significant, thousands
+from .choose import Tried, Verdict
+from .difference import delta_itp, difference
+from .images import write_exr
+from .plots import difference_map, ladder, picture, scale, scene_map
+from .scene import MEASURES
+from .study import Study
+
+PAGE, NUMBERS, PICTURES = "scene.html", "scene.json", "scene.exr"
+TOP = 10.0
+"""ΔE ITP of the darkest colour of the difference maps."""
+
+
+def write_scene(out_dir: StrPath, study: Study, exr: bool = False) -> Path:
+    """Write DIR/scene.json and DIR/scene.html, and DIR/scene.exr if asked, each replaced whole; returns the page's path.
+
+    Raises InputError if a file cannot be written.
+    """
+    from jinja2 import Environment, FileSystemLoader, StrictUndefined
+
+    where = environment()
+    here = Path(__file__).parent
+    templates = Environment(
+        loader=FileSystemLoader([here, here.parent / "reports"]),
+        autoescape=True,
+        undefined=StrictUndefined,
+        trim_blocks=True,
+        lstrip_blocks=True,
+    )
+    html = templates.get_template("scene.html.j2").render(_context(study, where))
+    numbers = json.dumps(document(study, where), indent=1, ensure_ascii=False, allow_nan=False) + "\n"
+    out = Path(out_dir)
+    for name, text in ((NUMBERS, numbers), (PAGE, html)):
+        with replacing(out / name) as temporary:
+            temporary.write_text(text, encoding="utf-8")
+    if exr:
+        layers = {k: study.view.picture(p.values) for k, p in study.pictures.items()}
+        layers = {k: v if v.shape[-1] == 3 else np.repeat(v.mean(-1, keepdims=True), 3, -1) for k, v in layers.items()}
+        write_exr(out / PICTURES, layers)
+    return out / PAGE
+
+
+def document(study: Study, where: dict[str, Any]) -> dict[str, Any]:
+    """All figures as plain JSON values; NaN becomes null."""
+    scene, choice = study.scene, study.choice
+    return {
+        "format": "brdfit-scene",
+        "version": 1,
+        "environment": where,
+        "scene": scene.name,
+        "material": study.table.material,
+        "source": study.table.source,
+        "sha256": study.table.sha256,
+        "angles": study.table.angles,
+        "exposure": study.exposure,
+        "tolerance": {"measure": scene.tolerance.measure, "limit": scene.tolerance.limit},
+        "budget": scene.budget,
+        "pixels": len(study.view.wo),
+        "met": choice.met,
+        "affordable": choice.affordable,
+        "summary": summary(study),
+        "chosen": _record(study, choice.chosen, "chosen"),
+        "everything": _record(study, choice.everything, "everything"),
+        "ladder": [_brief(t) for t in choice.ladder],
+        "effects": [
+            {"effect": v.effect, "called_for": v.called, "because": because(study, v), "other": v.other and _brief(v.other)}
+            for v in choice.verdicts
+        ],
+        "tried": [{"effects": list(t.effects), "fit_error": _number(t.fit_error)} for t in choice.tried],
+        "filled": study.filled,
+        "noise": None
+        if study.reference.noise is None
+        else float(study.reference.noise.mean() / study.reference.values.mean()),
+        "seconds": study.seconds,
+    }
+
+
+def _record(study: Study, t: Tried, key: str) -> dict[str, Any]:
+    values = study.pictures[key].values
+    errors = {m: _number(difference(m, values, study.reference.values, study.exposure, study.view)) for m in MEASURES}
+    named = {n: v.tolist() for n, v in parameter_values(t.model).items()}
+    return _brief(t) | {"nanoseconds": study.times[key], "errors": errors, "model": t.model.name, "parameters": named}
+
+
+def _brief(t: Tried) -> dict[str, Any]:
+    work = t.operations
+    return {
+        "effects": list(t.effects),
+        "error": _number(t.error),
+        "nanoseconds": t.nanoseconds,
+        "flops": _number(work.flops),
+        "transcendentals": _number(work.transcendentals),
+    }
+
+
+def _number(x: float) -> float | None:
+    return float(x) if np.isfinite(x) else None
+
+
+def summary(study: Study) -> str:
+    """What was found, in a few sentences."""
+    choice, limit = study.choice, study.scene.tolerance
+    name = MEASURES[limit.measure][1]
+    times = study.times["everything"] / study.times["chosen"]
+    ratio = f"{significant(times, 2)} times as fast" if times >= 1 else f"{significant(1 / times, 2)} times as slow"
+    figures = f"{name} {significant(choice.chosen.error)} (tolerance {limit.limit:g})"
+    said = f"In this scene {study.table.material} shows {_names(choice.chosen)}: {figures}."
+    if not choice.met:
+        said = (
+            f"No set of effects meets the tolerance: the best, {_names(choice.chosen)}, ends at {figures}. {missing(study)}"
+        )
+    said += (
+        f" It takes {significant(study.times['chosen'], 2)} ns a direction, {ratio} as all "
+        f"{len(choice.everything.effects)} effects together ({significant(study.times['everything'], 2)} ns, "
+        f"{significant(choice.everything.error)})."
+    )
+    if not choice.affordable and study.scene.budget is not None:
+        said += f" That is more than the budget of {study.scene.budget:g} ns."
+    return said
+
+
+def missing(study: Study) -> str:
+    """Where the chosen model falls short, in words."""
+    off = delta_itp(study.pictures["chosen"].values, study.reference.values, study.exposure)
+    light = study.seen
+    if not len(light.weight):
+        return ""
+    # of the pixels the worst tenth, by the angles that the light of them comes from
+    at = np.argsort(off)[-max(len(off) // 10, 1) :]
+    share = (off[at] ** 2).sum() / max((off**2).sum(), 1e-30)
+    n = study.view.wo[at, 2]
+    grazing = float(np.degrees(np.arccos(np.clip(np.median(n), 0, 1))))
+    chosen, table = (study.pictures[k].values[at].mean() for k in ("chosen", "table"))
+    way = "too dark" if chosen < table else "too bright"
+    return (
+        f"A tenth of the pixels holds {percent(share)} of the squared difference: they are seen at about "
+        f"{grazing:.0f}° from the normal and are {way} by {percent(abs(chosen / table - 1))}."
+    )
+
+
+def because(study: Study, v: Verdict) -> str:
+    """Why a scene calls for an effect or does not, with figures."""
+    limit, chosen, other = study.scene.tolerance, study.choice.chosen, v.other
+    here = significant(chosen.error)
+    if other is None:
+        return "no model is left without it" if v.called else _untried(study, v.effect)
+    there = significant(other.error)
+    if v.called:
+        gone = [n for n in chosen.effects if n not in other.effects and n != v.effect]
+        so = f" (nor {listed(_plain(n) for n in gone)}, which need it)" if gone else ""
+        if limit.met(other.error):
+            return f"without it{so} the error is {there}, within the tolerance too, but the model costs more"
+        return f"without it{so} the error is {there}, not {here}"
+    more = other.nanoseconds - chosen.nanoseconds
+    cost = f"{significant(abs(more), 2)} ns {'more' if more > 0 else 'less'} a direction"
+    return f"with it the error is {there}, not {here}, at {cost}"
+
+
+def _untried(study: Study, effect: str) -> str:
+    lacking = [need for need in EFFECTS[effect].needs if not set(need.split(" or ")) & set(study.choice.chosen.effects)]
+    if lacking:
+        return f"it needs {listed(_plain(n) for n in lacking)}, which the scene does not call for"
+    return "the tolerance is met without it"
+
+
+def _plain(name: str) -> str:
+    return name.replace("_", " ")
+
+
+def _names(t: Tried) -> str:
+    return listed(_plain(n) for n in t.effects)
+
+
+def _context(study: Study, where: dict[str, Any]) -> dict[str, Any]:
+    scene, choice, view = study.scene, study.choice, study.view
+    limit = scene.tolerance
+    parts = {"table": "measured table", "chosen": _names(choice.chosen), "everything": "everything"}
+    pictures = [
+        {
+            "title": title,
+            "image": picture(view, study.pictures[key].values, study.exposure),
+            "caption": "" if key == "table" else f"{significant(study.times[key], 2)} ns a direction",
+        }
+        for key, title in parts.items()
+    ]
+    differences = []
+    for key in ("chosen", "everything"):
+        values = study.pictures[key].values
+        off = delta_itp(values, study.reference.values, study.exposure)
+        figures = f"RMS {significant(np.sqrt((off**2).mean()))}, largest {significant(off.max())}"
+        differences.append({"title": parts[key], "image": difference_map(view, off, TOP), "caption": figures})
+    cells = study.seen.cells(study.table.layout)  # type: ignore[arg-type]
+    known = [t for t in choice.tried if "error" in vars(t) and t not in choice.ladder]
+    noise = study.reference.noise
+    return {
+        "material": study.table.material,
+        "source": Path(study.table.source).name,
+        "sha256": study.table.sha256[:12],
+        "scene": scene.name,
+        "where": where,
+        "summary": summary(study),
+        "met": choice.met,
+        "measure": MEASURES[limit.measure][1],
+        "limit": f"{limit.limit:g}",
+        "pictures": pictures,
+        "differences": differences,
+        "scale": scale(),
+        "top": f"{TOP:g}",
+        "ladder": ladder(choice.ladder, known, limit, "Image error over the cost of the model"),
+        "rungs": [_row(t, choice.ladder[k - 1].effects if k else ()) for k, t in enumerate(choice.ladder)]
+        + [_row(choice.everything, None)],
+        "called": [_said(study, v) for v in choice.verdicts if v.called],
+        "not_called": [_said(study, v) for v in choice.verdicts if not v.called],
+        "map": scene_map(cells, study.table.layout, "Where in theta_h and theta_d the picture comes from"),  # type: ignore[arg-type]
+        "angles": _angles(study),
+        "filled": percent(study.filled) if study.filled > 5e-4 else "",
+        "noise": "" if noise is None else percent(float(noise.mean() / study.reference.values.mean())),
+        "parameters": [
+            (n, " ".join(significant(x, 4) for x in np.atleast_1d(v)))
+            for n, v in parameter_values(choice.chosen.model).items()
+        ],
+        "pixels": thousands(len(view.wo)),
+        "size": minus(f"{scene.camera.pixels[0]} \u00d7 {scene.camera.pixels[1]}"),
+        "tried": len(choice.tried),
+        "seconds": seconds(study.seconds),
+    }
+
+
+def _said(study: Study, v: Verdict) -> dict[str, str]:
+    return {"name": _plain(v.effect), "meaning": EFFECTS[v.effect].meaning, "because": because(study, v)}
+
+
+def _row(t: Tried, before: tuple[str, ...] | None) -> dict[str, str]:
+    new = [_plain(n) for n in t.effects if before is not None and n not in before]
+    return {
+        "label": "everything" if before is None else listed(new) if not before else f"+ {listed(new)}",
+        "error": significant(t.error),
+        "time": significant(t.nanoseconds, 2),
+        "flops": thousands(t.operations.flops),
+        "transcendentals": thousands(t.operations.transcendentals),
+    }
+
+
+def _angles(study: Study) -> str:
+    """The middle half of what is seen, in words."""
+    h, d, _, _ = half_difference(study.seen.wi, study.seen.wo)
+    said = []
+    for name, x in (("θh", h), ("θd", d)):
+        order = np.argsort(x)
+        steps = np.cumsum(study.seen.weight[order])
+        low, high = (np.degrees(x[order][np.searchsorted(steps, q * steps[-1])]) for q in (0.05, 0.95))
+        said.append(f"{name} from {significant(low, 2)} to {significant(high, 2)} degrees")
+    return " and ".join(said)
+
+
+__all__ = ["PAGE", "because", "document", "missing", "summary", "write_scene"]
