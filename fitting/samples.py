@@ -214,22 +214,24 @@ def compress(whole: Samples, table: Table, used: NDArray[np.bool_], max_angle: f
     h, d = grid.theta_h[rows[0], None, None], grid.theta_d[None, rows[1], None]
     weight = fold.unfold(np.asarray(whole.cells.weight))
     chunks = [slice(i, i + CHUNK) for i in range(0, len(h), CHUNK)]
-    geometries = [_plain_geometry(h[at], d, grid.phi_d, weight[at] > 0) for at in chunks]
-    for at, g in zip(chunks, geometries, strict=True):
-        relative = loss.weight(g)
-        weight[at] *= 1.0 if relative is None else np.asarray(relative)
+
+    def geometry(at: slice) -> Geometry:
+        return _plain_geometry(h[at], d, grid.phi_d, weight[at] > 0)
+
+    if loss.weigh is not None:
+        for at in chunks:
+            weight[at] *= np.asarray(loss.weigh(geometry(at)))
     rules = row_rules(np.where(grid.phi_d > np.pi, 2 * np.pi - grid.phi_d, grid.phi_d), weight, k)
 
-    def reduced(chunk: tuple[slice, Geometry]) -> tuple[Reals, Reals]:
+    def reduced(at: slice) -> tuple[Reals, Reals]:
         """Values at the nodes of some rows, and the square sum that they leave out."""
-        at, g = chunk
         part = np.ix_(rows[0][at], rows[1])
         planes = np.stack([np.where(used[part], plane[part], 0.0) for plane in table.planes])
-        transformed = np.asarray(transform(jnp.asarray(planes), g))
+        transformed = np.asarray(transform(jnp.asarray(planes), geometry(at)))
         values, kept = rules.compress(transformed, at)
         return values, np.einsum("hdp,chdp,chdp->c", weight[at], transformed, transformed) - kept
 
-    parts = list(in_threads(reduced, list(zip(chunks, geometries, strict=True))))
+    parts = list(in_threads(reduced, chunks))
     remainder = np.sum([left_out for _, left_out in parts], 0)
     node_weight = rules.weight
     at_nodes = _plain_geometry(h, d, rules.phi, node_weight > 0)
@@ -264,9 +266,9 @@ def _folded(g: Geometry, fold: _Fold, limit: float) -> Geometry:
 
 def _plain_geometry(h: Reals, d: Reals, phi: Reals, fitted: NDArray[np.bool_]) -> Geometry:
     """Geometry of half/difference angles; where not fitted, of the normal direction."""
-    cos_i, cos_o = (jnp.asarray(np.where(fitted, c, 1.0)) for c in polar_cosines(h, d, phi))
-    cos_h, sin2_h, cos_d, sin2_d = (jnp.asarray(a) for a in (np.cos(h), np.sin(h) ** 2, np.cos(d), np.sin(d) ** 2))
-    return Geometry(cos_i, cos_o, cos_h, sin2_h, cos_d, sin2_d)
+    cos_i, cos_o = (np.where(fitted, c, 1.0) for c in polar_cosines(h, d, phi))
+    fields: Any = cos_i, cos_o, np.cos(h), np.sin(h) ** 2, np.cos(d), np.sin(d) ** 2
+    return Geometry(*fields)
 
 
 def _axes(grid: HalfDifferenceGrid) -> tuple[bytes, bytes, bytes]:
@@ -286,6 +288,7 @@ def _grid_geometry(
     rows = np.flatnonzero(valid.any((1, 2))), np.flatnonzero(valid.any((0, 2)))
     # Guard: cells that are not fitted have weight 0, and 0 * inf = NaN: they get a harmless direction
     # (tests/test_samples.py::test_unused_cells_are_harmless).
+    del cos_i, cos_o  # two copies of the grid
     g = _plain_geometry(h[rows[0], None, None], d[None, rows[1], None], p, valid[np.ix_(*rows)])
     return _folded(g, _Fold(g.cos_i.shape, along_phi), limit), rows
 
