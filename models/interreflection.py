@@ -100,7 +100,7 @@ def _missing(facets: Any, lobe: ndf.GTR | _GGX, cosine: Float[Array, " n"]) -> F
     around = jnp.asarray(np.r_[y * wy, y * wy], dtype)
     c = cosine[:, None, None]
     s = jnp.sqrt((1 - c) * (1 + c))
-    end = (jnp.pi / 2 + jnp.arctan2(s * cos_phi, c)) / 2
+    end = jnp.arctan2(c, -s * cos_phi) / 2  # half of pi/2 + delta, tan(delta) = tan(theta) cos(phi)
     share, rest = lobe.cumulative(jnp.sin(end) ** 2, jnp.cos(end) ** 2)
     far = (1 - x) ** 3  # and towards the end of the range, where the lobe's tail is
     sin2, cos2 = lobe.quantile(share * (1 - far), rest + share * far)
@@ -108,7 +108,9 @@ def _missing(facets: Any, lobe: ndf.GTR | _GGX, cosine: Float[Array, " n"]) -> F
     facing = s * sin_m * cos_phi + c * cos_m
     out = jnp.maximum(2 * facing * cos_m - c, 0)  # at the end of the range it is 0 to rounding
     light, viewer = averted_area(facets, jnp.minimum(out, 1)), averted_area(facets, c)
-    seen = out * facing / (cos_m * (c * (out + light) + out * viewer))
+    # Guard: two quotients, because the derivative of one squares its divisor, 1e-22 here, beyond float32
+    # (tests/test_effects.py::test_finite_at_corners).
+    seen = out / (c * (out + light) + out * viewer) * (facing / cos_m)
     lost = jnp.sum(3 * wx * (1 - x) ** 2 * share * (1 - seen), -1) + rest[..., 0]
     return jnp.sum(around * lost, -1)
 

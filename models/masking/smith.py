@@ -61,7 +61,10 @@ def averted_area(ndf: NDF, cosine: Float[Array, "..."], rule: Rule | None = None
     c2, s2 = held * held, (1 - held) * (1 + held)
     norm = c2[..., None] + s2[..., None] * cos2_t
     sin2_m, cos2_m = c2[..., None] / norm, s2[..., None] * cos2_t / norm
-    total = jnp.sum((g - d * (slope - d * bend)) * (ndf(sin2_m, cos2_m) / norm**2), -1)
+    # Guard: reciprocals, because the derivative of 1/norm^2 squares it, 1e41 where a stretched lobe is grazed, beyond
+    # float32 (tests/test_effects.py::test_finite_at_corners).
+    per = 1 / norm
+    total = jnp.sum((g - d * (slope - d * bend)) * (ndf(sin2_m, cos2_m) * per * per), -1)
     return 2 * held * c2 * s2 * unmoved * total
 
 
