@@ -8,17 +8,15 @@ from typing import ClassVar
 import numpy as np
 from jaxtyping import Array, Float
 
-from ..geometry import Geometry
 from . import ndf
-from .base import BRDF, NOT_NEGATIVE, POSITIVE, Interval, parameter
+from .base import NOT_NEGATIVE, POSITIVE, Interval, parameter
 from .common import diffuse_parameter
-from .diffuse import lambert
 from .fresnel import dielectric
 from .masking import vcavity
-from .microfacet import microfacet
+from .parts import Composition, Lobe, Parts
 
 
-class ABC(BRDF):
+class ABC(Composition):
     """f = diffuse/pi + specular F_dielectric(ior, c_d) D_abc G_vcavity / (4 n.l n.v) (Low et al. 2012, eq. 15).
 
     Low et al. leave D unnormalised and divide by pi; here D is normalised, so that specular is a scale near 1.
@@ -48,8 +46,8 @@ class ABC(BRDF):
             shapes.append({"b": float(np.expm1(np.log(2) / c) / (vers * scale)), "c": c, "ior": ior})
         return shapes + [{"b": float(1 / vers), "c": 20.0, "ior": ior} for ior in (1.5, 60.0)]
 
-    def evaluate(self, g: Geometry) -> Float[Array, "..."]:
-        """Value in 1/sr."""
-        lobe = ndf.ABC(self.b, self.c)
-        f = self.specular * dielectric(self.ior, g)
-        return lambert(self.diffuse) + microfacet(lobe(g.sin2_h, g.cos2_h), f, vcavity(g))
+    parts: ClassVar[Parts] = Parts(
+        albedo=lambda m, g: m.diffuse,
+        lobes=(Lobe(lambda m: ndf.ABC(m.b, m.c), lambda m, g: m.specular * dielectric(m.ior, g)),),
+        visibility=lambda facets, g: vcavity(g),
+    )

@@ -20,7 +20,7 @@ Term = Callable[[Any, Geometry], Field]
 """A quantity of the parameters of one channel and a geometry."""
 
 
-def implicit(lobe: NDF, g: Geometry) -> float:
+def implicit(lobe: Any, g: Geometry) -> Any:
     """V = 1/4, of G = (n.l)(n.v): masking that its divisor cancels (Hoffman 2013, eq. 29)."""
     return 0.25
 
@@ -39,7 +39,7 @@ def density(facets: Any, g: Geometry) -> Field:
 class Lobe:
     """Microfacets of one distribution."""
 
-    facets: Callable[[Any], NDF]
+    facets: Callable[[Any], NDF | Stretched]
     """Their distribution, of the parameters."""
     reflectance: Term
     """F of one facet, with its scale."""

@@ -8,17 +8,15 @@ from typing import ClassVar
 import numpy as np
 from jaxtyping import Array, Float
 
-from ..geometry import Geometry
 from . import ndf
-from .base import BRDF, NOT_NEGATIVE, POSITIVE, REAL, parameter
+from .base import NOT_NEGATIVE, POSITIVE, REAL, parameter
 from .common import diffuse_parameter
-from .diffuse import lambert
 from .fresnel import sgd_fresnel
 from .masking import smith_separable
-from .microfacet import microfacet
+from .parts import Composition, Lobe, Parts
 
 
-class SGD(BRDF):
+class SGD(Composition):
     """f = diffuse/pi + specular F_sgd D_sgd G1(l) G1(v) / (4 n.l n.v), G1 the exact Smith masking of D_sgd.
 
     Bagher et al. (2012) divide by pi instead of 4 and use a fitted approximation of G1; both are absorbed here (see the
@@ -55,8 +53,8 @@ class SGD(BRDF):
             shapes.append({"alpha": float(grid[np.argmin(np.abs(fall - np.log(2)))]), "p": p})
         return shapes + [{"alpha": a, "p": p} for a, p in ((1e-4, 1.2), (1e-3, 1.0), (0.3, 8.0), (2.0, 20.0))]
 
-    def evaluate(self, g: Geometry) -> Float[Array, "..."]:
-        """Value in 1/sr."""
-        lobe = ndf.SGD(self.alpha, self.p)
-        f = self.specular * sgd_fresnel(self.f0, self.f1, g)
-        return lambert(self.diffuse) + microfacet(lobe(g.sin2_h, g.cos2_h), f, smith_separable(lobe, g))
+    parts: ClassVar[Parts] = Parts(
+        albedo=lambda m, g: m.diffuse,
+        lobes=(Lobe(lambda m: ndf.SGD(m.alpha, m.p), lambda m, g: m.specular * sgd_fresnel(m.f0, m.f1, g)),),
+        visibility=smith_separable,
+    )

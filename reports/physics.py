@@ -120,7 +120,8 @@ class NormalReflectance:
 def normal_reflectance(model: str, parameters: Mapping[str, Reals]) -> NormalReflectance | None:
     """F0 of a fitted model by its name and parameters; None where the model has nothing that corresponds to it."""
     p = parameters
-    if model in ("gtr", "ggx", "pbr", "cook_torrance", "ashikhmin_shirley") and "specular" in p:
+    composed = "lobe" in model.split("+")
+    if (composed or model in ("gtr", "ggx", "pbr", "cook_torrance", "ashikhmin_shirley")) and "specular" in p:
         return NormalReflectance(np.atleast_1d(p["specular"]), "specular", "a parameter of the model")
     if model == "abc" and {"specular", "ior"} <= set(p):
         n = p["ior"]
@@ -166,7 +167,7 @@ def lobe_width(model: str, parameters: Mapping[str, Reals]) -> Width | None:
 
 def _half_sin2(model: str, p: Mapping[str, float]) -> float | None:
     """sin^2 of the angle at which D is half its peak."""
-    if model in ("gtr", "ggx", "pbr") and "alpha" in p:
+    if (model in ("gtr", "ggx", "pbr") or "lobe" in model.split("+")) and "alpha" in p:
         a2 = p["alpha"] ** 2
         grow = np.expm1(np.log(2) / p.get("gamma", 2.0))
         return float(a2 * grow / (1 - a2)) if a2 < 1 else None

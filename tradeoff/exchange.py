@@ -3,22 +3,21 @@
 from __future__ import annotations
 
 from collections.abc import Callable
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from functools import cache
-from typing import Any
+from typing import Any, ClassVar
 
 import jax.numpy as jnp
 from jaxtyping import Array, Float
 
 from ..geometry import Geometry
-from ..models import BRDF, ndf
+from ..models import BRDF
 from ..models.abc import ABC
-from ..models.diffuse import lambert
-from ..models.fresnel import dielectric, dielectric_f0, schlick, sgd_fresnel
+from ..models.fresnel import dielectric, dielectric_f0, schlick
 from ..models.gtr import GTR
 from ..models.masking import smith_correlated, smith_separable, vcavity
 from ..models.masking.smith import NDF
-from ..models.microfacet import microfacet
+from ..models.parts import Composition, Parts
 from ..models.sgd import SGD
 
 Field = Float[Array, "..."]
@@ -27,10 +26,9 @@ Fresnel = Callable[[Any, Geometry], Field]
 
 
 @dataclass(frozen=True)
-class Parts:
-    """What a microfacet model with Lambert's body is composed of."""
+class Own:
+    """What a microfacet model has in place of what it may be exchanged for."""
 
-    lobe: Callable[[Any], NDF]
     fresnel: Fresnel
     """With its scale."""
     masking: str
@@ -53,10 +51,9 @@ MASKINGS: dict[str, Masking] = {
 }
 """V = G / (4 n.l n.v) of a lobe."""
 
-PARTS: dict[type[BRDF], Parts] = {
-    GTR: Parts(lambda m: ndf.GTR(m.alpha, m.gamma), lambda m, g: schlick(m.specular, g), "Smith, height-correlated"),
-    ABC: Parts(lambda m: ndf.ABC(m.b, m.c), lambda m, g: m.specular * dielectric(m.ior, g), "V-cavity"),
-    SGD: Parts(lambda m: ndf.SGD(m.alpha, m.p), lambda m, g: m.specular * sgd_fresnel(m.f0, m.f1, g), "Smith, separable"),
+PARTS: dict[type[BRDF], Own] = {
+    cls: Own(cls.parts.lobes[0].reflectance, masking)
+    for cls, masking in ((GTR, "Smith, height-correlated"), (ABC, "V-cavity"), (SGD, "Smith, separable"))
 }
 
 
@@ -87,17 +84,15 @@ COUNTERPART = {
 
 
 @cache
-def exchanged(cls: type[BRDF], fresnel: Fresnel | None = None, masking: Masking | None = None) -> type[BRDF]:
+def exchanged(cls: type[Composition], fresnel: Fresnel | None = None, masking: Masking | None = None) -> type[BRDF]:
     """The model class ``cls``, a key of :data:`PARTS`, with the parts given in place of its own."""
-    parts = PARTS[cls]
-    reflect, mask = fresnel or parts.fresnel, masking or MASKINGS[parts.masking]
+    own = cls.parts
+    lobes = tuple(replace(lobe, reflectance=fresnel or lobe.reflectance) for lobe in own.lobes)
 
     class Exchanged(cls):  # type: ignore[valid-type, misc]
         """The same parameters, other parts."""
 
-        def evaluate(self, g: Geometry) -> Field:
-            lobe = parts.lobe(self)
-            return lambert(self.diffuse) + microfacet(lobe(g.sin2_h, g.cos2_h), reflect(self, g), mask(lobe, g))
+        parts: ClassVar[Parts] = replace(own, lobes=lobes, visibility=masking or own.visibility)
 
     return Exchanged
 

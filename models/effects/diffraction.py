@@ -17,14 +17,16 @@ from .effect import Effect, Shapes
 
 def _scattering(m: Any, g: Geometry) -> Float[Array, "..."]:
     d2 = 4 * g.cos_d**2 * g.sin2_h  # |D_p|^2 = |l + v|^2 sin^2(theta_h)
-    return m.scatter * jnp.exp(-m.c * jnp.log1p(m.b * d2))
+    scattering: Float[Array, "..."] = m.scatter * jnp.exp(-m.c * jnp.log1p(m.b * d2))
+    return scattering
 
 
 def _risen(m: Any, g: Geometry) -> Float[Array, "..."]:
     """With F at the angle whose sine is |l_xy - v_xy|/2."""
     cosine = jnp.sqrt(g.cos_d**2 + (g.cos_i - g.cos_o) ** 2 / 4)
     vers = g.tangential_distance2 / 4 / (1 + cosine)
-    return (m.specular + (1 - m.specular) * vers**5) * _scattering(m, g)
+    fresnel: Float[Array, "..."] = m.specular + (1 - m.specular) * vers**5
+    return fresnel * _scattering(m, g)
 
 
 def _add(parts: Parts, effects: frozenset[str]) -> Parts:
