@@ -7,6 +7,7 @@ import math
 import os
 import re
 from collections.abc import Sequence
+from dataclasses import replace
 from pathlib import Path
 from tempfile import TemporaryFile
 from typing import TYPE_CHECKING, Any
@@ -111,6 +112,7 @@ def commands() -> None:
     type=click.Choice(["solid_angle", "cells"]),
     help="What a cell counts by.",
 )
+@click.option("--scene", "scene_file", metavar="SCENE.toml", help="Weight cells by what this scene shows of them.")
 @_angles
 @_max_angle
 @click.option("--seed", default=0, show_default=True, type=click.IntRange(0), help="Seed of random starts.")
@@ -132,6 +134,7 @@ def fit_command(
     out_dir: str,
     loss: str,
     measure: str,
+    scene_file: str | None,
     angles: Any,
     max_angle: float,
     seed: int,
@@ -151,6 +154,13 @@ def fit_command(
         kept = {path: load(path, angles=angles)}
     _keep_programs()
     names = _checked_names(models, loss)
+    scene = None
+    if scene_file is not None:
+        from .scenes import load_scene, weighted
+
+        if measure != "solid_angle":
+            raise click.UsageError("--scene is a measure itself: leave --measure out", click.get_current_context())
+        scene = load_scene(scene_file)
     out = _writable(out_dir)
 
     from .environment import environment
@@ -177,7 +187,11 @@ def fit_command(
                 table = kept.pop(path) if path in kept else load(path, angles=angles)
                 progress.say(f"{table.material}: fitting")
                 first, views = len(fits), None
+                if scene is not None:
+                    table = weighted(table, scene)
                 for f in fit_many([table], names, **options):
+                    if scene is not None:
+                        f = replace(f, measure=f"scene {scene.name}")
                     fits[first:] = sorted([*fits[first:], f], key=lambda f: names.index(f.model_name))
                     write_fits(out, fits, where)
                     progress.advance("\n  ".join(filter(None, (_line(f), planned(f)))))

@@ -1,6 +1,7 @@
 """What a scene calls for: its picture with the measured table, with models, and with no more of a model than it shows."""
 
 from .illumination import illuminate
+from .look import look, weighted
 from .measured import Measured, measured
 from .page import write_scene
 from .read import load_scene
@@ -18,9 +19,11 @@ __all__ = [
     "View",
     "illuminate",
     "load_scene",
+    "look",
     "measured",
     "render",
     "study",
     "view",
+    "weighted",
     "write_scene",
 ]

@@ -204,7 +204,7 @@ def _context(study: Study, where: dict[str, Any]) -> dict[str, Any]:
         off = delta_itp(values, study.reference.values, study.exposure)
         figures = f"RMS {significant(np.sqrt((off**2).mean()))}, largest {significant(off.max())}"
         differences.append({"title": parts[key], "image": difference_map(view, off, TOP), "caption": figures})
-    cells = study.seen.cells(study.table.layout)  # type: ignore[arg-type]
+    cells = study.seen.cells(study.grid)
     known = [t for t in choice.tried if "error" in vars(t) and t not in choice.ladder]
     noise = study.reference.noise
     return {
@@ -226,7 +226,7 @@ def _context(study: Study, where: dict[str, Any]) -> dict[str, Any]:
         + [_row(choice.everything, None)],
         "called": [_said(study, v) for v in choice.verdicts if v.called],
         "not_called": [_said(study, v) for v in choice.verdicts if not v.called],
-        "map": scene_map(cells, study.table.layout, "Where in theta_h and theta_d the picture comes from"),  # type: ignore[arg-type]
+        "map": scene_map(cells, study.grid, "Where in theta_h and theta_d the picture comes from"),
         "angles": _angles(study),
         "filled": percent(study.filled) if study.filled > 5e-4 else "",
         "noise": "" if noise is None else percent(float(noise.mean() / study.reference.values.mean())),

@@ -5,12 +5,11 @@ from __future__ import annotations
 import time
 from dataclasses import dataclass
 from threading import Lock
-from typing import Any
 
 import numpy as np
 
 from ..fitting.starts import Summary, summarise
-from ..models import BRDF, model
+from ..models import BRDF
 from ..models.effects import EFFECTS, compose
 from ..progress import Progress
 from ..tables import Table
@@ -19,20 +18,14 @@ from ..tradeoff.sample import Sample
 from ..tradeoff.timing import interleaved
 from .choose import Choice, Effects, Tried, choose
 from .difference import difference
-from .illumination import Illumination, illuminate
-from .lobe import lobe_alpha
-from .measured import measured
+from .look import Look, look
 from .quick_fit import Shown, quick_fit, shown
 from .ready import ready
 from .render import Rendered, render
-from .scene import MEASURES, Reals, Scene
-from .seen import Seen, seen
-from .view import View, view
+from .scene import MEASURES, Scene
 
-PIECES = 4
+PIECES = 3
 """Steps that :func:`study` reports to a progress."""
-MEAN = 0.8
-"""What the mean of a white Lambertian surface is shown as, where a scene does not set its exposure."""
 FITTED_ANGLE = np.radians(80)
 """Cells within this polar angle say where fits start."""
 DEAR = frozenset({"interreflection", "dispersion"})
@@ -42,20 +35,9 @@ REPEATS, BUDGET = 5, 1.0
 
 
 @dataclass(frozen=True, eq=False)
-class Study:
+class Study(Look):
     """What was found."""
 
-    scene: Scene
-    table: Table
-    view: View
-    exposure: float
-    alpha: float
-    """Width of the lobe of the table, which directions of extended light are drawn by."""
-    reference: Rendered
-    """The picture of the measured table."""
-    seen: Seen
-    filled: float
-    """Share of the picture, by weight, that rests on cells of the table that were not measured."""
     choice: Choice
     pictures: dict[str, Rendered]
     """``table``, ``chosen`` and ``everything``."""
@@ -72,19 +54,11 @@ def study(table: Table, scene: Scene, progress: Progress | None = None) -> Study
     begin = time.perf_counter()
     progress = progress or Progress(PIECES, silent=True)
     progress.say(f"{table.material}: the picture of the table")
-    what, gaps = measured(table)
-    pixels = view(scene)
-    light = illuminate(scene, pixels, table.channels)
-    alpha = lobe_alpha(what)
-    exposure = exposure_of(scene, light)
-    reference = render(what, light, alpha=alpha, samples=scene.samples)
-    progress.advance(f"{len(light.wo)} pixels of the object, exposure {exposure:.3g}")
-    visible = seen(what, light, reference, exposure, alpha)
-    filled = float((visible.cells(table.layout) * gaps).sum())  # type: ignore[arg-type]
-    progress.advance(f"{len(visible.weight)} pairs of directions behind them")
+    here = look(table, scene)
+    progress.advance(f"{len(here.view.wo)} pixels of the object, exposure {here.exposure:.3g}")
     used = table.within(FITTED_ANGLE)
     summary = summarise(table, used if used.any() else table.mask)
-    bench = _Bench(scene, pixels, light, exposure, alpha, reference, shown(visible), summary, visible)
+    bench = _Bench(here, shown(here.seen), summary)
     progress.say("searching")
     among = [n for n in EFFECTS if n not in DEAR and (n != "anisotropy" or not table.isotropic)]
     choice = choose(bench, scene.tolerance, scene.budget, among)
@@ -93,39 +67,20 @@ def study(table: Table, scene: Scene, progress: Progress | None = None) -> Study
     timed = interleaved({k: bench.evaluation(t) for k, t in both.items()}, REPEATS, BUDGET)
     progress.advance(f"{len(choice.tried)} sets of effects fitted")
     return Study(
-        scene,
-        table,
-        pixels,
-        exposure,
-        alpha,
-        reference,
-        visible,
-        filled,
-        choice,
-        {"table": reference} | {k: bench.pictures[t.effects] for k, t in both.items()},
-        {k: 1e9 * t.per(TIMED).median for k, t in timed.items()},
-        time.perf_counter() - begin,
+        **vars(here),
+        choice=choice,
+        pictures={"table": here.reference} | {k: bench.pictures[t.effects] for k, t in both.items()},
+        times={k: 1e9 * t.per(TIMED).median for k, t in timed.items()},
+        seconds=time.perf_counter() - begin,
     )
 
 
 class _Bench:
     """Fits, pictures and costs of models in one scene."""
 
-    def __init__(
-        self,
-        scene: Scene,
-        pixels: View,
-        light: Illumination,
-        exposure: float,
-        alpha: float,
-        reference: Rendered,
-        data: Shown,
-        summary: Summary,
-        visible: Seen,
-    ) -> None:
-        self.scene, self.pixels, self.light, self.exposure, self.alpha = scene, pixels, light, exposure, alpha
-        self.reference, self.data, self.summary = reference, data, summary
-        few = visible.draw(TIMED)
+    def __init__(self, here: Look, data: Shown, summary: Summary) -> None:
+        self.here, self.data, self.summary = here, data, summary
+        few = here.seen.draw(TIMED)
         self.sample = Sample(few.wi, few.wo, few.measured, 90.0)
         self.pictures: dict[tuple[str, ...], Rendered] = {}
         self.evaluations: dict[tuple[str, ...], Evaluation] = {}
@@ -136,10 +91,11 @@ class _Bench:
         return quick.model, quick.error
 
     def error(self, tried: Tried) -> float:
-        picture = render(ready(tried.model), self.light, alpha=self.alpha, samples=self.scene.samples)
+        here = self.here
+        picture = render(ready(tried.model), here.light, alpha=here.alpha, samples=here.scene.samples)
         self.pictures[tried.effects] = picture
-        measure = self.scene.tolerance.measure
-        return difference(measure, picture.values, self.reference.values, self.exposure, self.pixels)
+        measure = here.scene.tolerance.measure
+        return difference(measure, picture.values, here.reference.values, here.exposure, here.view)
 
     def cost(self, tried: Tried) -> tuple[float, Operations]:
         evaluation = self.evaluation(tried)
@@ -153,13 +109,4 @@ class _Bench:
         return self.evaluations[tried.effects]
 
 
-def exposure_of(scene: Scene, light: Illumination) -> float:
-    """The scene's exposure; by default that which shows a white Lambertian surface with a mean of 0.8."""
-    if scene.exposure is not None:
-        return scene.exposure
-    white: Any = model("lambert", diffuse=1.0)
-    mean: Reals = render(white, light, alpha=1.0, samples=scene.samples).values.mean()
-    return MEAN / float(mean) if mean > 0 else 1.0
-
-
-__all__ = ["PIECES", "Study", "exposure_of", "study"]
+__all__ = ["PIECES", "Study", "study"]
