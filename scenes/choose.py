@@ -56,18 +56,19 @@ class Tried:
         return self.bench.error(self)
 
     @cached_property
-    def _cost(self) -> tuple[float, Operations]:
+    def costs(self) -> tuple[float, Operations]:
+        """Nanoseconds and operations."""
         return self.bench.cost(self)
 
     @property
     def nanoseconds(self) -> float:
         """For one pair of directions and all channels, in float32."""
-        return self._cost[0]
+        return self.costs[0]
 
     @property
     def operations(self) -> Operations:
         """The compiler's count of the same."""
-        return self._cost[1]
+        return self.costs[1]
 
 
 @dataclass(frozen=True)

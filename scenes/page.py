@@ -94,7 +94,7 @@ def _record(study: Study, t: Tried, key: str) -> dict[str, Any]:
     values = study.pictures[key].values
     errors = {m: _number(difference(m, values, study.reference.values, study.exposure, study.view)) for m in MEASURES}
     named = {n: v.tolist() for n, v in parameter_values(t.model).items()}
-    return _brief(t) | {"nanoseconds": study.times[key], "errors": errors, "model": t.model.name, "parameters": named}
+    return _brief(t) | {"errors": errors, "model": t.model.name, "parameters": named}
 
 
 def _brief(t: Tried) -> dict[str, Any]:
@@ -116,7 +116,7 @@ def summary(study: Study) -> str:
     """What was found, in a few sentences."""
     choice, limit = study.choice, study.scene.tolerance
     name = MEASURES[limit.measure][1]
-    times = study.times["everything"] / study.times["chosen"]
+    times = choice.everything.nanoseconds / choice.chosen.nanoseconds
     ratio = f"{significant(times, 2)} times as fast" if times >= 1 else f"{significant(1 / times, 2)} times as slow"
     figures = f"{name} {significant(choice.chosen.error)} (tolerance {limit.limit:g})"
     said = f"In this scene {study.table.material} shows {_names(choice.chosen)}: {figures}."
@@ -125,8 +125,8 @@ def summary(study: Study) -> str:
             f"No set of effects meets the tolerance: the best, {_names(choice.chosen)}, ends at {figures}. {missing(study)}"
         )
     said += (
-        f" It takes {significant(study.times['chosen'], 2)} ns a direction, {ratio} as all "
-        f"{len(choice.everything.effects)} effects together ({significant(study.times['everything'], 2)} ns, "
+        f" It takes {significant(choice.chosen.nanoseconds, 2)} ns a direction, {ratio} as all "
+        f"{len(choice.everything.effects)} effects together ({significant(choice.everything.nanoseconds, 2)} ns, "
         f"{significant(choice.everything.error)})."
     )
     if not choice.affordable and study.scene.budget is not None:
@@ -189,12 +189,15 @@ def _names(t: Tried) -> str:
 def _context(study: Study, where: dict[str, Any]) -> dict[str, Any]:
     scene, choice, view = study.scene, study.choice, study.view
     limit = scene.tolerance
+    models = {"chosen": choice.chosen, "everything": choice.everything}
     parts = {"table": "measured table", "chosen": _names(choice.chosen), "everything": "everything"}
     pictures = [
         {
             "title": title,
             "image": picture(view, study.pictures[key].values, study.exposure),
-            "caption": "" if key == "table" else f"{significant(study.times[key], 2)} ns a direction",
+            "caption": f"exposure {significant(study.exposure)}"
+            if key == "table"
+            else f"{significant(models[key].nanoseconds, 2)} ns a direction",
         }
         for key, title in parts.items()
     ]

@@ -41,8 +41,6 @@ class Study(Look):
     choice: Choice
     pictures: dict[str, Rendered]
     """``table``, ``chosen`` and ``everything``."""
-    times: dict[str, float]
-    """Nanoseconds a pair of directions of ``chosen`` and ``everything``, measured in turns."""
     seconds: float
 
 
@@ -64,13 +62,12 @@ def study(table: Table, scene: Scene, progress: Progress | None = None) -> Study
     choice = choose(bench, scene.tolerance, scene.budget, among)
     progress.advance(f"{choice.chosen.label}: {MEASURES[scene.tolerance.measure][1]} {choice.chosen.error:.3g}")
     both = {"chosen": choice.chosen, "everything": choice.everything}
-    timed = interleaved({k: bench.evaluation(t) for k, t in both.items()}, REPEATS, BUDGET)
+    bench.time([t for t in choice.tried if "error" in vars(t)])
     progress.advance(f"{len(choice.tried)} sets of effects fitted")
     return Study(
         **vars(here),
         choice=choice,
         pictures={"table": here.reference} | {k: bench.pictures[t.effects] for k, t in both.items()},
-        times={k: 1e9 * t.per(TIMED).median for k, t in timed.items()},
         seconds=time.perf_counter() - begin,
     )
 
@@ -102,6 +99,13 @@ class _Bench:
         with self.timing:
             took = interleaved({0: evaluation}, 3, 0.1)[0].per(TIMED).median
         return 1e9 * took, evaluation.operations()
+
+    def time(self, several: list[Tried]) -> None:
+        """Time models in turns, so that they can be compared; what :meth:`cost` found under load is replaced."""
+        evaluations = {t.effects: self.evaluation(t) for t in several}
+        took = interleaved(evaluations, REPEATS, BUDGET)
+        for t in several:
+            vars(t)["costs"] = 1e9 * took[t.effects].per(TIMED).median, evaluations[t.effects].operations()
 
     def evaluation(self, tried: Tried) -> Evaluation:
         if tried.effects not in self.evaluations:
