@@ -12,6 +12,7 @@ from collections.abc import Callable
 
 import jax
 import jax.numpy as jnp
+import numpy as np
 from jaxtyping import Array, ArrayLike, Float
 
 Scalars = Float[Array, "..."]
@@ -63,14 +64,14 @@ def sine(cosine: Scalars) -> Scalars:
     derivatives of products of quotients, can still be divided by (tests/test_empirical.py::test_finite).
     """
     square = (1 - cosine) * (1 + cosine)
-    return jnp.sqrt(jnp.maximum(square, jnp.finfo(square.dtype).tiny ** 0.25))
+    return jnp.sqrt(jnp.maximum(square, float(np.finfo(square.dtype).tiny) ** 0.25))
 
 
 @jax.custom_jvp
 def lambert_w(x: ArrayLike) -> Scalars:
     """W with W e^W = x, for x >= 0, by Newton's method on W + ln W = ln x; relative error below 1e-13."""
     x = jnp.asarray(x)
-    tiny = jnp.finfo(x.dtype).tiny
+    tiny = float(np.finfo(x.dtype).tiny)
     right = jnp.log(jnp.maximum(x, tiny))
     w = jnp.where(right > 1, right - jnp.log(jnp.maximum(right, 1)), x / (1 + x))
     for _ in range(6):

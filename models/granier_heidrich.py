@@ -5,7 +5,6 @@ from __future__ import annotations
 from typing import ClassVar
 
 import jax.numpy as jnp
-import numpy as np
 from jaxtyping import Array, Float
 
 from ..geometry import Geometry
@@ -61,12 +60,10 @@ class GranierHeidrich(BRDF):
 
     @classmethod
     def shapes(cls, half_width: float) -> list[dict[str, float]]:
-        """Both lobes as wide as that of the data, or one much wider, for four thicknesses."""
+        """Both lobes as wide as that of the data, or one much wider, for three thicknesses."""
         e = exponent_shapes(2 * half_width)[2]["exponent"]
-        pairs = [(e, e), (e, max(0.1 * e, 0.5)), (max(0.1 * e, 0.5), e)]
-        return [
-            {"thickness": float(d), "exponent": a, "base_exponent": b} for d in np.linspace(0.05, 0.5, 4) for a, b in pairs
-        ]
+        pairs = [(e, e), (e, max(0.1 * e, 0.5))]
+        return [{"thickness": d, "exponent": a, "base_exponent": b} for d in (0.1, 0.25, 0.4) for a, b in pairs]
 
     def evaluate(self, g: Geometry) -> Float[Array, "..."]:
         """Value in 1/sr."""

@@ -48,13 +48,12 @@ class HTSG(BRDF):
 
     @classmethod
     def shapes(cls, half_width: float) -> list[dict[str, float]]:
-        """Smooth to rough heights, with the correlation length that makes the lobe as wide, and half as wide."""
+        """Smooth to rough heights, with the correlation length that makes the lobe as wide, for two indices."""
         found = []
-        for sigma in (0.05, 0.15, 0.5, 2.0):
+        for sigma in (0.05, 0.15, 0.6, 2.0):
             orders = max(1.0, (4 * np.pi * sigma) ** 2)
             tau = np.sqrt(np.log(2) * orders) / (2 * np.pi * np.sin(half_width))
-            for k in (1.0, 2.0):
-                found += [{"sigma": sigma, "tau": float(np.clip(tau * k, 0.06, 900)), "ior": n} for n in (1.5, 10.0)]
+            found += [{"sigma": sigma, "tau": float(np.clip(tau, 0.06, 900)), "ior": n} for n in (1.5, 10.0)]
         return found
 
     def evaluate(self, g: Geometry) -> Float[Array, "..."]:

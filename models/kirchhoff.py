@@ -49,7 +49,7 @@ def scattering_series(g: Float[Array, "..."], t: Float[Array, "..."]) -> Float[A
 
 def _peak(g: Float[Array, "..."], t: Float[Array, "..."]) -> tuple[Float[Array, "..."], Float[Array, "..."]]:
     """Index and width of the largest term: m = g e^(y/2), y + ln y = ln(2 t/g^2); three digits are enough."""
-    tiny = jnp.finfo(g.dtype).tiny
+    tiny = float(np.finfo(g.dtype).tiny)
     right = jnp.log(2 * t + tiny) - 2 * jnp.log(g)
     y = jnp.where(right > 1, right, jnp.exp(jnp.minimum(right, 1)))
     for _ in range(4):

@@ -295,28 +295,30 @@ MODELS: dict[str, Callable[..., Any]] = {
 """By the name of the class under test: functions of unit vectors and parameters."""
 
 
-def _at(name: str, wi: Vector, wo: Vector, numbers: dict[str, Any]) -> Any:
+def _at(name: str, ends: Sequence[Vector], numbers: dict[str, Any]) -> Any:
     if name in microfacets.MODELS:  # defined off the unit sphere too, by l + v and l - v
-        return MODELS[name](wi, wo, **numbers)
-    return MODELS[name](unit(wi), unit(wo), **numbers)
+        return MODELS[name](*ends, **numbers)
+    return MODELS[name](unit(ends[0]), unit(ends[1]), **numbers)
+
+
+def _exact(wi: Sequence[float], wo: Sequence[float]) -> list[list[Any]]:
+    return [[mpf(float(x)) for x in w] for w in (wi, wo)]
 
 
 def value(name: str, parameters: dict[str, float], wi: Sequence[float], wo: Sequence[float]) -> Any:
     """The model's value for parameters taken as exact and directions taken as exact but for their length."""
     with mp.workdps(DIGITS):
-        numbers = {k: mpf(float(x)) for k, x in parameters.items()}
-        return _at(name, [mpf(float(x)) for x in wi], [mpf(float(x)) for x in wo], numbers)
+        return _at(name, _exact(wi, wo), {k: mpf(float(x)) for k, x in parameters.items()})
 
 
 def gradient(name: str, parameters: dict[str, float], wi: Sequence[float], wo: Sequence[float]) -> dict[str, Any]:
     """Derivatives by parameter, and by the components of the directions tangential to the sphere, ``wi_0`` to ``wo_2``."""
     out = {}
     with mp.workdps(DIFFERENCE_DIGITS):
-        numbers = {k: mpf(float(x)) for k, x in parameters.items()}
-        ends = [[mpf(float(x)) for x in wi], [mpf(float(x)) for x in wo]]
+        numbers, ends = {k: mpf(float(x)) for k, x in parameters.items()}, _exact(wi, wo)
         for key, x in numbers.items():
             step = STEP * (abs(x) or 1)
-            high, low = (_at(name, *ends, {**numbers, key: x + s}) for s in (step, -step))
+            high, low = (_at(name, ends, {**numbers, key: x + s}) for s in (step, -step))
             out[key] = (high - low) / (2 * step)
         for side, label in enumerate(("wi", "wo")):
             for axis in range(3):
@@ -324,7 +326,7 @@ def gradient(name: str, parameters: dict[str, float], wi: Sequence[float], wo: S
                 for s in (STEP, -STEP):
                     pair = [list(e) for e in ends]
                     pair[side][axis] += s
-                    moved.append(_at(name, *pair, numbers))
+                    moved.append(_at(name, pair, numbers))
                 out[f"{label}_{axis}"] = (moved[0] - moved[1]) / (2 * STEP)
     return out
 
