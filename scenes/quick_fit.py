@@ -118,7 +118,7 @@ class _Linearised:
 
     def _at(self, x: Reals) -> Reals:
         if not np.array_equal(x, self.last):
-            self.last, self.factor = x.copy(), np.asarray(_linearise(self.data, x, self.chart))
+            self.last, self.factor = x.copy(), np.asarray(_linearise(self.data, jnp.asarray(x), self.chart))
         return self.factor
 
     def residual(self, x: Reals) -> Reals:

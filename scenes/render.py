@@ -72,7 +72,8 @@ def render(brdf: Any, light: Illumination, *, alpha: float = 0.3, samples: int =
         what, arriving = cast((brdf, light), dtype)
         extended = light.extended is not None
         rounds = -(-samples // BATCHES) if extended else 0
-        batches = np.asarray(_program(what, arriving, np.asarray(alpha, dtype) if extended else None, rounds), np.float64)
+        width = jnp.asarray(alpha, dtype) if extended else None
+        batches = np.asarray(_program(what, arriving, width, rounds), np.float64)
     if not extended:
         return Rendered(batches[0])
     return Rendered(batches.mean(0), batches.std(0, ddof=1) / np.sqrt(BATCHES))

@@ -48,7 +48,8 @@ def sampled(
             return total + _round(brdf, light, wo, alpha, u - jnp.floor(u))
 
         start = jax.eval_shape(lambda: _round(brdf, light, wo, alpha, shift))
-        return jax.lax.fori_loop(0, rounds, add, jnp.zeros(start.shape, start.dtype)) / rounds
+        total: Array = jax.lax.fori_loop(0, rounds, add, jnp.zeros(start.shape, start.dtype))
+        return total / rounds
 
     means: Array = jax.lax.map(batch, jax.random.split(key, BATCHES))
     return means

@@ -85,10 +85,11 @@ def seen(table: Measured, light: Illumination, picture: Rendered, exposure: floa
         for _ in range(ROUNDS):
             with jax.enable_x64(True):
                 u = rng.random((techniques_of(extended), 2, len(part)))
-                wi, arriving = drawn(*cast((some, np.asarray(light.wo)[part], np.float64(alpha), u), "float64"))
-            for w, a in zip(np.asarray(wi), np.asarray(arriving), strict=True):
-                rows.append((w, np.asarray(light.wo)[part], np.broadcast_to(a, (len(part), a.shape[-1])), part))
-    wi, wo, arriving, at = (np.concatenate([r[k] for r in rows]) for k in range(4))
+                directions, reach = drawn(*cast((some, np.asarray(light.wo)[part], np.float64(alpha), u), "float64"))
+            for w, a in zip(np.asarray(directions), np.asarray(reach), strict=True):
+                rows.append((w, np.asarray(light.wo)[part], a * (len(every) / len(part) / ROUNDS), part))
+    wi, wo, arriving = (np.concatenate([r[k] for r in rows]) for k in range(3))
+    at = np.concatenate([r[3] for r in rows])
     with jax.enable_x64(True):
         values = np.asarray(jax.jit(lambda m, i, o: m(i, o))(*cast((table, wi, wo), "float64")), float)
     pixel = picture.values * exposure

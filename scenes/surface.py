@@ -23,8 +23,12 @@ def intersect(shape: Shape, origin: Reals, ray: Reals) -> tuple[Reals, Reals]:
     # (tests/test_scenes.py::test_perspective_goes_over_into_parallel_rays)
     back = _dot(o, ray)
     o = o - back[:, None] * ray
-    cut = _sphere if isinstance(shape, Sphere) else _plane if isinstance(shape, Plane) else _frustum
-    further, normals = cut(shape, o, ray, back)  # type: ignore[operator]
+    if isinstance(shape, Sphere):
+        further, normals = _sphere(shape, o, ray, back)
+    elif isinstance(shape, Plane):
+        further, normals = _plane(shape, o, ray, back)
+    else:
+        further, normals = _frustum(shape, o, ray, back)
     return further - back, normals
 
 

@@ -8,11 +8,12 @@ import colour
 import numpy as np
 import pytest
 from brdfit.models.effects import EFFECTS
+from brdfit.reports.colours import luminance
 from brdfit.scenes.choose import choose, possible, smaller, without
 from brdfit.scenes.difference import delta_itp, difference, ssim
 from brdfit.scenes.illumination import illuminate
 from brdfit.scenes.look import look, weighted
-from brdfit.scenes.scene import Camera, Directional, Point, Scene, Sphere, Tolerance
+from brdfit.scenes.scene import Ambient, Camera, Directional, Point, Scene, Sphere, Tolerance
 from brdfit.scenes.seen import pq, visibility
 from brdfit.scenes.view import view
 from brdfit.tradeoff.evaluation import Operations
@@ -149,6 +150,21 @@ def test_cells_hold_what_is_seen(here):
     at = np.concatenate([np.flatnonzero(np.asarray(p.wi)[:, 2] > 0) for p in light.punctual])
     np.add.at(by_pixel, at, here.seen.weight)
     np.testing.assert_allclose(by_pixel[lit], (whole / whole[lit].sum())[lit], rtol=1e-4, atol=1e-9)
+
+
+def test_each_sort_of_light_has_its_share(small_table):
+    """Sampled pairs weigh together what their light contributes to the pictures, beside a light that is not sampled."""
+    table, _ = small_table
+    lights = (Directional((0.3, 0.4, 1.0), (3.0,) * 3), Ambient((0.7,) * 3))
+    camera = Camera(pixels=(40, 40))
+    whole = look(table, Scene("", Sphere(), camera, lights, exposure=1.0))
+    ambient = look(table, Scene("", Sphere(), camera, lights[1:], exposure=1.0))
+    total, part = (luminance(x.reference.values) for x in (whole, ambient))
+    counts = visibility(total) ** 2
+    expected = (counts * part / total).sum() / counts.sum()
+    lit = int((np.asarray(whole.light.punctual[0].arriving) > 0).any(1).sum())
+    got = whole.seen.weight[lit:].sum()  # lights without extent come first
+    assert got == pytest.approx(expected, rel=0.01)  # 16 rounds for a thousand pixels
 
 
 def test_draws_follow_the_weights(here):

@@ -48,11 +48,20 @@ FAULTS = {
     "pixels = [30, 20]": ("pixels = [30, 0]", "line 13: camera pixels must be two whole numbers from 1 to 4096"),
     "irradiance = 3\n": ("radiance = 3\n", "line 15: light 1 misses the key 'irradiance': a number or [red, green, blue]"),
     "position = [1, 2, 3]": ("position = [1, nan, 3]", "line 22: light 2 position must be three numbers"),
-    "intensity = [1, 2, 3]": ("intensity = -1", "line 23: light 2 intensity must be a number or [red, green, blue], none neg"),
-    'measure = "psnr"': ('measure = "mse"', "line 26: tolerance measure must be one of itp, ciede2000, psnr, ssim, relative"),
+    "intensity = [1, 2, 3]": (
+        "intensity = -1",
+        "line 23: light 2 intensity must be a number or [red, green, blue], none neg",
+    ),
+    'measure = "psnr"': (
+        'measure = "mse"',
+        "line 26: tolerance measure must be one of itp, ciede2000, psnr, ssim, relative",
+    ),
     "budget = 50": ("buget = 50", "line 3: buget is not known here; known: budget, camera, exposure, light, name, samples"),
     "exposure = 2.0": ('exposure = "bright"', "line 2: exposure must be a number above 0, not 'bright'"),
-    "direction = [0, 1, 1]": ("direction = [0, 0, 0]", "line 17: light 1 direction must be three numbers, [x, y, z], not all 0"),
+    "direction = [0, 1, 1]": (
+        "direction = [0, 0, 0]",
+        "line 17: light 1 direction must be three numbers, [x, y, z], not all 0",
+    ),
     "[shape]": ("[shapes]", "line 1: the file misses the table [shape]"),
     "[camera]": ("[camera", "is not TOML: "),
 }
