@@ -1,0 +1,545 @@
+"""Effects: each term against its paper, absent where not asked for, stable at the corners, recovered by fits."""
+
+from __future__ import annotations
+
+import pickle
+from collections.abc import Callable
+from functools import cache
+from itertools import combinations
+from typing import Any
+
+import brdfit
+import jax
+import jax.numpy as jnp
+import mpmath
+import numpy as np
+import pytest
+from brdfit.data.synthetic.layouts import grid as grid_of
+from brdfit.fitting.result import from_record
+from brdfit.geometry import from_directions
+from brdfit.models import EFFECTS, build, parameters_of, variants
+from brdfit.models.effects import effect, in_order, parts_of
+from brdfit.models.gtr import GTR
+from brdfit.references import REFERENCES
+from brdfit.reports.physics import hemisphere
+from mpmath import mpf
+
+from .cases import WI, WO
+from .report_cases import table_of
+
+Reals = np.ndarray
+mp = mpmath.mp
+
+TRUTH: dict[str, Any] = {
+    "diffuse": [0.2, 0.1, 0.05],
+    "sigma": 0.5,
+    "specular": [0.5, 0.3, 0.1],
+    "alpha": 0.15,
+    "alpha_x": 0.1,
+    "alpha_y": 0.3,
+    "gamma": 1.6,
+    "specular_2": [0.05, 0.1, 0.15],
+    "alpha_2": 0.5,
+    "retro": [0.02, 0.03, 0.04],
+    "alpha_retro": 0.2,
+    "scatter": [0.5, 0.4, 0.3],
+    "b": 60.0,
+    "c": 1.4,
+}
+DISPERSED = {"alpha": [0.1, 0.15, 0.2], "gamma": [1.6, 1.8, 2.1]}
+
+
+def truth_of(name: str) -> dict[str, Any]:
+    (cls,) = variants(name)
+    return {
+        p.name: DISPERSED[p.name] if p.per_channel and p.name in DISPERSED else TRUTH[p.name] for p in parameters_of(cls)
+    }
+
+
+# The terms, as the papers have them -----------------------------------------------------------------------------------
+
+
+class View:
+    """Angles of a pair of directions in 30 digits, from their definitions."""
+
+    def __init__(self, wi: Reals, wo: Reals) -> None:
+        self.l, self.v = ([mpf(float(x)) for x in w] for w in (wi, wo))
+        self.l, self.v = ([x / mp.sqrt(dot(w, w)) for x in w] for w in (self.l, self.v))
+        self.h = unit([a + b for a, b in zip(self.l, self.v, strict=True)])
+        self.cos_d = dot(self.l, self.h)
+
+
+def dot(a: Any, b: Any) -> Any:
+    return sum((x * y for x, y in zip(a, b, strict=True)), mpf(0))
+
+
+def unit(a: Any) -> Any:
+    size = mp.sqrt(dot(a, a))
+    return [x / size for x in a]
+
+
+def ggx(m: Any, ax: Any, ay: Any) -> Any:
+    """Burley 2012, eq. 13."""
+    return 1 / (mp.pi * ax * ay * ((m[0] / ax) ** 2 + (m[1] / ay) ** 2 + m[2] ** 2) ** 2)
+
+
+def ggx_lambda(w: Any, ax: Any, ay: Any) -> Any:
+    """Heitz 2014, eq. 72 and 80."""
+    return (mp.sqrt(1 + ((ax * w[0]) ** 2 + (ay * w[1]) ** 2) / w[2] ** 2) - 1) / 2
+
+
+def gtr(m: Any, alpha: Any, gamma: Any) -> Any:
+    """Burley 2012, appendix B.2, with the normalisation of its eq. 8 integrated."""
+    k = (gamma - 1) * (alpha**2 - 1) / (mp.pi * (1 - alpha ** (2 - 2 * gamma)))
+    return k / (1 + (alpha**2 - 1) * m[2] ** 2) ** gamma
+
+
+def schlick(f0: Any, cosine: Any) -> Any:
+    return f0 + (1 - f0) * (1 - cosine) ** 5
+
+
+def rough(q: View, p: dict[str, Any]) -> Any:
+    """Oren & Nayar 1994, eq. 30, from angles."""
+    angles = [mp.acos(w[2]) for w in (q.l, q.v)]
+    azimuth = mp.atan2(q.l[1], q.l[0]) - mp.atan2(q.v[1], q.v[0])
+    s = p["sigma"] ** 2
+    a, b = 1 - s / (2 * (s + mpf("0.33"))), mpf("0.45") * s / (s + mpf("0.09"))
+    return p["diffuse"] / mp.pi * (a + b * max(0, mp.cos(azimuth)) * mp.sin(max(angles)) * mp.tan(min(angles)))
+
+
+def masked(q: View, p: dict[str, Any], ax: Any, ay: Any) -> Any:
+    g2 = 1 / (1 + ggx_lambda(q.l, ax, ay) + ggx_lambda(q.v, ax, ay))
+    return ggx(q.h, ax, ay) * g2 / (4 * q.l[2] * q.v[2])
+
+
+def traded(q: View, p: dict[str, Any]) -> Any:
+    """Ashikhmin & Shirley 2000, eq. 5."""
+    rise = [1 - (1 - w[2] / 2) ** 5 for w in (q.l, q.v)]
+    return 28 * p["diffuse"] / (23 * mp.pi) * (1 - p["specular"]) * rise[0] * rise[1]
+
+
+def back(q: View, p: dict[str, Any]) -> Any:
+    mirrored = [-q.l[0], -q.l[1], q.l[2]]
+    b = unit([x + y for x, y in zip(mirrored, q.v, strict=True)])
+    return p["retro"] * ggx(b, p["alpha_retro"], p["alpha_retro"]) / 4
+
+
+def smooth(q: View, p: dict[str, Any], f: Callable[[Any], Any]) -> Any:
+    """Low et al. 2012, eq. 16, as the published fits have it."""
+    d2 = (q.l[0] + q.v[0]) ** 2 + (q.l[1] + q.v[1]) ** 2
+    across2 = (q.l[0] - q.v[0]) ** 2 + (q.l[1] - q.v[1]) ** 2
+    return p["scatter"] * f(mp.sqrt(1 - across2 / 4)) / (1 + p["b"] * d2) ** p["c"]
+
+
+TERMS: dict[str, Callable[[View, dict[str, Any]], Any]] = {
+    "body": lambda q, p: p["diffuse"] / mp.pi,
+    "body+rough_body": rough,
+    "lobe": lambda q, p: p["specular"] * ggx(q.h, p["alpha"], p["alpha"]) / 4,
+    "lobe+tail": lambda q, p: p["specular"] * gtr(q.h, p["alpha"], p["gamma"]) / 4,
+    "lobe+fresnel": lambda q, p: schlick(p["specular"], q.cos_d) * ggx(q.h, p["alpha"], p["alpha"]) / 4,
+    "lobe+masking": lambda q, p: p["specular"] * masked(q, p, p["alpha"], p["alpha"]),
+    "lobe+second_lobe+fresnel": lambda q, p: (
+        (
+            schlick(p["specular"], q.cos_d) * ggx(q.h, p["alpha"], p["alpha"])
+            + schlick(p["specular_2"], q.cos_d) * ggx(q.h, p["alpha_2"], p["alpha_2"])
+        )
+        / 4
+    ),
+    "lobe+anisotropy": lambda q, p: p["specular"] * ggx(q.h, p["alpha_x"], p["alpha_y"]) / 4,
+    "lobe+anisotropy+masking": lambda q, p: p["specular"] * masked(q, p, p["alpha_x"], p["alpha_y"]),
+    "body+lobe+fresnel+trade_off": lambda q, p: (
+        traded(q, p) + schlick(p["specular"], q.cos_d) * ggx(q.h, p["alpha"], p["alpha"]) / 4
+    ),
+    "body+lobe+trade_off": lambda q, p: (
+        p["diffuse"] * (1 - p["specular"]) / mp.pi + p["specular"] * ggx(q.h, p["alpha"], p["alpha"]) / 4
+    ),
+    "retro": back,
+    "diffraction": lambda q, p: smooth(q, p, lambda c: 1),
+    "diffraction+fresnel": lambda q, p: smooth(q, p, lambda c: schlick(p["specular"], c)),
+}
+"""Values by the papers, for one channel."""
+
+RANGES = {
+    "diffuse": (0, 1),
+    "sigma": (0, 1.5),
+    "specular": (0, 1),
+    "specular_2": (0, 1),
+    "retro": (0, 1),
+    "scatter": (0, 5),
+    "gamma": (0.5, 6),
+    "c": (0.1, 4),
+    "b": (0.1, 1e6),
+}
+"""Of random parameters; widths lie in [1e-3, 2], in the logarithm."""
+
+DRAWS = 12
+
+
+@cache
+def drawn(name: str) -> tuple[dict[str, float], ...]:
+    """Parameters of one channel, rounded so that float32 holds them."""
+    rng = np.random.default_rng(len(name))
+    sets = []
+    for _ in range(DRAWS):
+        case = {}
+        for p in parameters_of(variants(name)[0]):
+            low, high = RANGES.get(p.name, (1e-3, 2.0))
+            logarithmic = p.name not in RANGES or p.name == "b"
+            value = np.exp(rng.uniform(np.log(low), np.log(high))) if logarithmic else rng.uniform(low, high)
+            case[p.name] = float(np.float32(value))
+        sets.append(case)
+    return tuple(sets)
+
+
+def stacked(name: str, cases: tuple[dict[str, float], ...], dtype: type = np.float64) -> Any:
+    """All cases as one instance with a leading axis, one channel each."""
+    (cls,) = variants(name)
+    columns = {p.name: np.array([c[p.name] for c in cases], dtype) for p in parameters_of(cls)}
+    return cls(**{p.name: columns[p.name][:, None] if p.per_channel else columns[p.name] for p in parameters_of(cls)})
+
+
+def values(name: str, wi: Reals, wo: Reals, dtype: type = np.float64, cases: Any = None) -> Reals:
+    """``[cases, directions]``."""
+    with jax.enable_x64(dtype is np.float64):
+        program = jax.jit(jax.vmap(lambda m, a, b: m(a, b)[..., 0], (0, None, None)))
+        out = np.asarray(program(stacked(name, cases or drawn(name), dtype), wi.astype(dtype), wo.astype(dtype)))
+        assert out.dtype == dtype
+        return out.astype(float)
+
+
+@cache
+def wanted(name: str) -> Reals:
+    with mp.workdps(30):
+        views = [View(a, b) for a, b in zip(WI, WO, strict=True)]
+        cases = [{k: mpf(v) for k, v in case.items()} for case in drawn(name)]
+        return np.array([[float(TERMS[name](q, p)) for q in views] for p in cases])
+
+
+@pytest.mark.parametrize("name", TERMS)
+def test_terms(name: str):
+    """1e-11 of the value: half of the digits of a product of exponentials to the 1e3; 1e-9 of it where two vectors that
+    graze the surface differ (float64 holds their difference to 1e-16/1e-8).
+    """
+    got, want = values(name, WI, WO), wanted(name)
+    assert got.size >= 500
+    error = np.abs(got - want) / (np.abs(want) + 1e-280)
+    worst = np.unravel_index(np.argmax(error), error.shape)
+    assert error.max() <= 1e-9, (error.max(), drawn(name)[worst[0]], WI[worst[1]], WO[worst[1]], want[worst])
+
+
+# Absence --------------------------------------------------------------------------------------------------------------
+
+
+def program(evaluate: Callable[[Any, Any], Any], m: Any, g: Any) -> str:
+    return str(jax.make_jaxpr(evaluate)(m, g))
+
+
+def by_hand(name: str) -> Callable[[Any, Any], Any]:
+    """The formula of some compositions, written out."""
+
+    def body(m: Any, g: Any) -> Any:
+        return m.diffuse / jnp.pi
+
+    def lobe(m: Any, g: Any) -> Any:
+        cos2 = g.cos_h * g.cos_h
+        d = (m.alpha / (g.sin2_h + m.alpha**2 * cos2)) ** 2 / jnp.pi
+        return m.specular * (d * 0.25)
+
+    def rising(m: Any, g: Any) -> Any:
+        cos2 = g.cos_h * g.cos_h
+        d = (m.alpha / (g.sin2_h + m.alpha**2 * cos2)) ** 2 / jnp.pi
+        f = m.specular + (1 - m.specular) * (g.sin2_d / (1 + g.cos_d)) ** 5
+        return f * (d * 0.25)
+
+    def smooth(m: Any, g: Any) -> Any:
+        d2 = 4 * g.cos_d**2 * g.sin2_h
+        return m.scatter * jnp.exp(-m.c * jnp.log1p(m.b * d2))
+
+    formulas: dict[str, Callable[[Any, Any], Any]] = {
+        "body": body,
+        "lobe": lobe,
+        "body+lobe": lambda m, g: body(m, g) + lobe(m, g),
+        "body+lobe+fresnel": lambda m, g: body(m, g) + rising(m, g),
+        "diffraction": smooth,
+        "body+diffraction": lambda m, g: body(m, g) + smooth(m, g),
+    }
+    return formulas[name]
+
+
+HAND = ("body", "lobe", "body+lobe", "body+lobe+fresnel", "diffraction", "body+diffraction")
+
+
+@pytest.mark.parametrize("name", HAND)
+def test_absent_effects_are_not_in_the_program(name: str):
+    with jax.enable_x64(True):
+        g = from_directions(WI, WO)
+        (cls,) = variants(name)
+        m = cls(**{p.name: jnp.asarray(0.5) for p in parameters_of(cls)})
+        assert program(lambda m, g: m.evaluate(g), m, g) == program(by_hand(name), m, g)
+
+
+def test_gtr_is_a_composition():
+    """The same program, and so are fits' coordinates and starts."""
+    cls = brdfit.compose("masking", "fresnel", "tail", "lobe", "body")
+    with jax.enable_x64(True):
+        g = from_directions(WI, WO)
+        numbers = {p.name: jnp.asarray(0.5) for p in parameters_of(GTR)}
+        assert program(lambda m, g: m.evaluate(g), cls(**numbers), g) == program(
+            lambda m, g: m.evaluate(g), GTR(**numbers), g
+        )
+    assert [p.name for p in parameters_of(cls)] == [p.name for p in parameters_of(GTR)]
+    assert list(cls.shapes(0.1)) == list(GTR.shapes(0.1))
+
+
+def test_a_new_effect_changes_nothing_for_others(monkeypatch: pytest.MonkeyPatch):
+    """An effect put into the library leaves the program of every other composition as it is."""
+    names = ("body+lobe+fresnel+masking", "body+rough_body+retro")
+    with jax.enable_x64(True):
+        g = from_directions(WI[:3], WO[:3])
+
+        def programs() -> list[str]:
+            out = []
+            for name in names:
+                (cls,) = variants(name)
+                m = cls(**{p.name: jnp.asarray(0.5) for p in parameters_of(cls)})
+                parts = parts_of(*name.split("+"))
+                out.append(program(parts.evaluate, m, g))
+            return out
+
+        before = programs()
+        glow = effect.Effect("glow", "a glow", "1", {}, lambda parts, names: parts)
+        monkeypatch.setattr("brdfit.models.effects.EFFECTS", {"glow": glow, **EFFECTS})
+        assert programs() == before
+
+
+# Names ----------------------------------------------------------------------------------------------------------------
+
+
+def test_every_effect_is_complete():
+    for e in EFFECTS.values():
+        assert e.meaning
+        assert e.formula
+        assert e.references
+        assert set(e.references) <= set(REFERENCES), e.name
+        for need in e.needs:
+            assert set(need.split(" or ")) <= set(EFFECTS), e.name
+    asked = {name for term in TERMS for name in term.split("+")}
+    assert set(EFFECTS) - asked == {"dispersion", "interreflection"}  # with tests of their own
+
+
+def test_composing():
+    cls = brdfit.compose("fresnel", "body", "lobe")
+    assert cls is brdfit.compose("body", "lobe", "fresnel")
+    assert cls.name == "body+lobe+fresnel"
+    assert variants("lobe+fresnel+body") == (cls,)
+    m = brdfit.model("body+lobe+fresnel", diffuse=0.1, specular=0.04, alpha=0.2)
+    assert type(m) is cls
+    again = pickle.loads(pickle.dumps(m))
+    assert type(again) is cls
+    assert (again.diffuse == m.diffuse).all()
+    both = brdfit.compose("body", "lobe", "tail", "anisotropy", "dispersion")
+    assert [p.name for p in parameters_of(both) if p.per_channel] == ["diffuse", "specular", "alpha_x", "alpha_y", "gamma"]
+    assert both.anisotropic
+
+
+@pytest.mark.parametrize(
+    ("names", "message"),
+    [
+        (
+            ("body", "glare"),
+            "unknown effect 'glare': choose from body, rough_body, lobe, tail, second_lobe, anisotropy, dis",
+        ),
+        (("body", "tail"), "effect 'tail' needs lobe, which is not among body, tail"),
+        (("rough_body",), "effect 'rough_body' needs body, which is not among rough_body"),
+        (("body", "fresnel"), "effect 'fresnel' needs lobe or diffraction, which is not among body, fresnel"),
+        (("lobe", "interreflection"), "effect 'interreflection' needs masking, which is not among lobe, interreflection"),
+        (("body", "body"), "effect 'body' is asked for twice"),
+        ((), "a model needs an effect: choose from body,"),
+    ],
+)
+def test_effects_that_do_not_go_together(names: tuple[str, ...], message: str):
+    with pytest.raises(ValueError, match=message):
+        brdfit.compose(*names)
+
+
+def test_unknown_names_list_models_and_effects():
+    with pytest.raises(ValueError, match=r"unknown model 'glare': choose from gtr, abc, .* join effects by \+: body, rough"):
+        brdfit.model("glare")
+    with pytest.raises(ValueError, match="unknown effect 'glare': choose from body"):
+        brdfit.model("body+glare")
+
+
+def test_every_pair_of_effects_that_goes_together_evaluates():
+    """Finite, per channel as declared; what does not go together says so."""
+    wi, wo = WI[:2], WO[:2]
+    base = ("body", "lobe", "masking")
+    with jax.enable_x64(True):
+        for pair in combinations(EFFECTS, 2):
+            names = in_order(dict.fromkeys((*base, *pair)))
+            name = "+".join(names)
+            m = build(variants(name)[0], truth_of(name))
+            assert jax.eval_shape(m, wi, wo).shape == (2, 3), name
+
+
+# Corners --------------------------------------------------------------------------------------------------------------
+
+CORNERS = (
+    "body+rough_body+lobe+fresnel+masking+trade_off+retro",
+    "lobe+tail+second_lobe+anisotropy+fresnel+masking",
+    "body+lobe+fresnel+masking+interreflection",
+    "diffraction+fresnel",
+)
+ENDS: dict[str, tuple[float, ...]] = {
+    **dict.fromkeys(("diffuse", "specular", "specular_2", "retro", "scatter"), (0.0, 1.0)),
+    **dict.fromkeys(("alpha", "alpha_2", "alpha_x", "alpha_y", "alpha_retro"), (1e-4, 1.0, 10.0)),
+    "gamma": (0.5, 1.0, 2.0),
+    "sigma": (0.0, 1.5),
+    "b": (1e-2, 1e6),
+    "c": (1e-3, 4.0),
+}
+
+
+def corner_cases(name: str) -> tuple[dict[str, float], ...]:
+    """Every parameter at every end of its range, the others in the middle, and all at their first or last ends."""
+    middle = {p.name: p.default for p in parameters_of(variants(name)[0])}
+    cases = [{**middle, n: end} for n in middle for end in ENDS[n]]
+    return (*cases, {n: ENDS[n][0] for n in middle}, {n: ENDS[n][-1] for n in middle})
+
+
+@pytest.mark.parametrize("name", CORNERS)
+@pytest.mark.parametrize("dtype", [np.float32, np.float64], ids=["float32", "float64"])
+def test_finite_at_corners(name: str, dtype: type):
+    """Value and gradient by every parameter and direction, at grazing, mirror, retro and normal directions."""
+
+    def one(m: Any, wi: Any, wo: Any) -> Any:
+        return m(wi, wo)[0]
+
+    few = np.r_[0:6, 12:26:2, len(WI) - 5 : len(WI)]
+    with jax.enable_x64(dtype is np.float64):
+        m = stacked(name, corner_cases(name), dtype)
+        inner = jax.vmap(jax.value_and_grad(one, (0, 1, 2)), (None, 0, 0))
+        out = jax.jit(jax.vmap(inner, (0, None, None)))(m, WI[few].astype(dtype), WO[few].astype(dtype))
+        assert all(np.isfinite(leaf).all() for leaf in jax.tree.leaves(out))
+
+
+@pytest.mark.parametrize("name", CORNERS)
+def test_reciprocity(name: str):
+    """To the rounding of sums of six terms, magnified by up to 1e3 where two grazing vectors are all but equal."""
+    cases = drawn(name)
+    there, back_again = values(name, WI, WO, cases=cases), values(name, WO, WI, cases=cases)
+    np.testing.assert_allclose(there, back_again, rtol=1e-11, atol=1e-290)
+
+
+@pytest.mark.parametrize("name", [n for n in TERMS if n != "body"])
+def test_single_precision(name: str):
+    """float32 against 30 digits on numbers that it holds, up to 89 degrees: 1e-4 of the value, where a term depends on the
+    fourth power of a cosine of 0.02 that is right to 6e-8; a lobe of 1e-6 of its peak need only be small.
+    """
+    up = np.flatnonzero(np.minimum(WI[:, 2], WO[:, 2]) > 0.015)
+    wi, wo = WI[up].astype(np.float32), WO[up].astype(np.float32)
+    got = values(name, wi, wo, np.float32)
+    exact = values(name, wi.astype(float), wo.astype(float))
+    assert np.isfinite(got).all()
+    error = np.abs(got - exact) / (np.abs(exact) + 1e-6 * np.abs(exact).max(1, keepdims=True))
+    assert error.max() <= 1e-4, error.max()
+
+
+# Energy ---------------------------------------------------------------------------------------------------------------
+
+
+def albedo(name: str, theta: float, **parameters: float) -> float:
+    """Directional albedo at theta degrees by 300 x 100 nodes in the half vector."""
+    light, viewer, weight = hemisphere(np.radians(theta), (300, 100))
+    with jax.enable_x64(True):
+        m = brdfit.model(name, **{k: [v] if k in ("diffuse", "specular") else v for k, v in parameters.items()})
+        f = np.asarray(jax.jit(lambda m, a, b: m(a, b)[:, 0])(m, np.broadcast_to(light, viewer.shape), viewer))
+    return float(weight @ f)
+
+
+@pytest.mark.parametrize("alpha", [0.05, 0.1, 0.3, 0.6, 1.0])
+def test_white_furnace(alpha: float):
+    """A lobe that reflects all, with interreflection, returns all light: to 5e-4 up to 85 degrees. Without, it does not."""
+    for theta in (0.0, 30.0, 60.0, 80.0, 85.0):
+        full = albedo("lobe+masking+interreflection", theta, specular=1.0, alpha=alpha)
+        assert full == pytest.approx(1, abs=5e-4), theta
+    assert albedo("lobe+masking", 60.0, specular=1.0, alpha=1.0) < 0.6
+
+
+def test_energy():
+    """At most all light comes back: with the trade-off of a perfect body, with interreflection of a metal with a tail."""
+    for theta in (0.0, 45.0, 75.0, 88.0):
+        assert albedo("body+lobe+fresnel+masking+trade_off", theta, diffuse=1.0, specular=0.3, alpha=0.2) <= 1
+        assert albedo("lobe+tail+fresnel+masking+interreflection", theta, specular=0.9, alpha=0.2, gamma=1.5) <= 1
+    # 1e-3: quadrature of a tail
+    assert albedo("lobe+tail+masking+interreflection", 30.0, specular=1.0, alpha=0.3, gamma=1.5) == pytest.approx(
+        1, abs=1e-3
+    )
+
+
+def test_compensation_of_a_colour():
+    """Kulla & Conty 2017: the compensating term is F_avg^2 E_avg/(1 - F_avg (1 - E_avg)) of that of a white lobe, with E_avg
+    measured by quadrature of the lobe alone.
+    """
+    x, w = np.polynomial.legendre.leggauss(12)
+    mu = (x + 1) / 2
+    mean = sum(
+        wk * m * albedo("lobe+masking", float(np.degrees(np.arccos(m))), specular=1.0, alpha=0.6)
+        for m, wk in zip(mu, w, strict=True)
+    )
+    f = 0.4
+    share = f**2 * mean / (1 - f * (1 - mean))
+
+    def extra(specular: float) -> float:
+        with_it = albedo("lobe+masking+interreflection", 40.0, specular=specular, alpha=0.6)
+        return with_it - albedo("lobe+masking", 40.0, specular=specular, alpha=0.6)
+
+    # 2e-3: 12 nodes for the mean
+    assert extra(f) / extra(1.0) == pytest.approx(share, rel=2e-3)
+
+
+# Dispersion, stretching -----------------------------------------------------------------------------------------------
+
+
+def test_dispersion_is_one_lobe_a_channel():
+    numbers = truth_of("body+lobe+tail+dispersion+fresnel+masking")
+    with jax.enable_x64(True):
+        together = np.asarray(brdfit.model("body+lobe+tail+dispersion+fresnel+masking", **numbers)(WI, WO))
+        for k in range(3):
+            one = {n: [v[k]] if n in ("diffuse", "specular") else v[k] for n, v in numbers.items()}
+            alone = np.asarray(brdfit.model("body+lobe+tail+fresnel+masking", **one)(WI, WO))
+            np.testing.assert_allclose(together[:, k : k + 1], alone, rtol=1e-12)
+
+
+def test_anisotropy_of_equal_widths_is_round():
+    """Also with a tail, whose masking is then an integral at the angle itself."""
+    numbers = {"specular": 0.5, "gamma": 1.6}
+    with jax.enable_x64(True):
+        round_lobe = brdfit.model("lobe+tail+fresnel+masking", alpha=0.3, **numbers)(WI, WO)
+        stretched = brdfit.model("lobe+tail+anisotropy+fresnel+masking", alpha_x=0.3, alpha_y=0.3, **numbers)(WI, WO)
+    np.testing.assert_allclose(stretched, round_lobe, rtol=1e-11)
+
+
+# Fits -----------------------------------------------------------------------------------------------------------------
+
+RECOVERED = (
+    "body+lobe+second_lobe+fresnel",
+    "body+lobe+fresnel+masking+interreflection+trade_off",
+    "body+lobe+anisotropy+fresnel+masking",
+    "body+rough_body+lobe+dispersion+retro",
+    "body+diffraction+fresnel",
+)
+
+
+@pytest.mark.parametrize("name", RECOVERED)
+def test_recovery(name: str):
+    """A table without noise, fitted from automatic starts: parameters come back to 1e-6."""
+    truth = truth_of(name)
+    layout = grid_of((6, 10, 8, 10) if variants(name)[0].anisotropic else (24, 16, 16), "edge")
+    fit = brdfit.fit(table_of(brdfit.model(name, **truth), layout), name)
+    assert fit.converged, fit.reason
+    assert fit.model_name == name
+    assert not fit.undetermined
+    for parameter, value in truth.items():
+        np.testing.assert_allclose(fit.parameters[parameter], value, rtol=1e-6, err_msg=parameter)
+    again = from_record(fit.record())
+    assert type(again.model) is variants(name)[0]
