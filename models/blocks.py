@@ -96,8 +96,8 @@ def _student_t(t: float) -> list[Shape]:
 
 def _epd(t: float) -> list[Shape]:
     return [
-        {"alpha": min(max(math.tan(t) * math.log(2) ** (-0.5 / p) * s, 2e-4), 20), "p": p}
-        for p, s in product((0.25, 0.5, 1.0), (0.03, 0.2, 1, 3))
+        {"alpha": min(max(math.tan(t) * math.log(2) ** (-0.5 / p) * s, 1e-6), 20), "p": p}
+        for p, s in product((0.25, 0.5, 1.0), (1e-3, 0.03, 0.2, 1, 3))
     ]
 
 
@@ -148,7 +148,7 @@ NDFS: dict[str, Distribution] = {
     "epd": Distribution(
         ndf.EPD,
         {
-            "alpha": _width(),
+            "alpha": parameter("lobe width", valid=POSITIVE, search=(1e-7, 30), default=0.1, log=True),
             "p": parameter(
                 "power of the squared slope (1: Beckmann)", valid=Interval(0, 1.5, True), search=(0.15, 1.5), default=1
             ),

@@ -13,6 +13,7 @@ import pytest
 from brdfit import models
 from brdfit.models import BRDF, parameters_of
 from brdfit.models.kirchhoff import scattering_series
+from brdfit.programs import OPTIONS
 from brdfit.reports.physics import hemisphere
 from brdfit.stability import empirical as oracle
 from brdfit.tables import HalfDifferenceGrid, table
@@ -34,6 +35,10 @@ ALL_WO = np.concatenate([WO, WI, [b for _, b in BELOW]])
 Found = tuple[np.ndarray, dict[str, np.ndarray]]
 
 
+QUICKLY = {**OPTIONS, "xla_backend_optimization_level": 0}
+"""Programs that run once: to compile them takes a third of the time so, and all of the test's."""
+
+
 @cache
 def program(cls: type[BRDF]) -> Any:
     """Values and derivatives by parameters and directions, compiled once a class and precision."""
@@ -42,7 +47,7 @@ def program(cls: type[BRDF]) -> Any:
         return m(wi, wo)[0]
 
     inner = jax.vmap(jax.value_and_grad(one, (0, 1, 2)), (None, 0, 0))
-    return jax.jit(jax.vmap(inner, (0, None, None)))
+    return jax.jit(jax.vmap(inner, (0, None, None)), compiler_options=QUICKLY)
 
 
 def evaluate(row: Row, stacked: BRDF, wi: np.ndarray, wo: np.ndarray, dtype: type = np.float64) -> Found:
@@ -111,7 +116,7 @@ def test_reciprocity(row: Row):
     np.testing.assert_allclose(value[:, :N], value[:, N : 2 * N], rtol=1e-12, atol=1e-290)
 
 
-@rows
+@pytest.mark.parametrize("row", [r for r in ROWS if r.single], ids=lambda r: r.name)
 def test_single_precision(row: Row):
     """float32 on numbers that it holds, against float64: 1e-5 of the value or the body term, or a dozen times what one
     rounding of the parameters and directions changes, which is what a formula's own roundings come to.
@@ -150,10 +155,11 @@ def test_mirror_term():
     """The specular term of HTSG, which no table holds, against 40 digits, from normal incidence to grazing."""
     theta = np.radians([0, 1e-3, 10, 40, 70, 85, 89, 89.99])
     light = np.stack([np.sin(theta), 0 * theta, np.sin(np.pi / 2 - theta)], -1)
+    mirror = jax.jit(lambda m, w: m.mirror_reflectance(w))
     with oracle.mp.workdps(oracle.DIGITS), jax.enable_x64(True):
         for sigma, tau, ior in ((0.02, 3.0, 1.5), (0.1, 0.4, 20.0), (0.3, 1.0, 1.5), (0.5, 9.0, 1.3)):
             m = models.model("htsg", diffuse=[0.1], specular=[0.7], ior=ior, sigma=sigma, tau=tau)
-            got = np.asarray(m.mirror_reflectance(light))[:, 0]
+            got = np.asarray(mirror(m, light))[:, 0]
             numbers = [oracle.mpf(x) for x in (0.7, ior, sigma, tau)]
             want = [float(oracle.htsg_mirror(oracle.unit([oracle.mpf(float(x)) for x in w]), *numbers)) for w in light]
             np.testing.assert_allclose(got, want, rtol=1e-11)
@@ -168,7 +174,7 @@ def test_waves_become_facets():
     beckmann = np.exp(-(1 / cos2 - 1) / m**2) / (np.pi * m**2 * cos2**2)
     with jax.enable_x64(True):
         waves = models.model("htsg", diffuse=0.0, specular=1.0, ior=1e6, sigma=sigma, tau=2 * sigma / m)
-        got = np.asarray(waves(light, viewer))[:, 0]
+        got = np.asarray(jax.jit(waves)(light, viewer))[:, 0]
     np.testing.assert_allclose(got, beckmann / (4 * light[:, 2] * viewer[:, 2]), rtol=5e-3)  # S: 3e-3 at 40 degrees
 
 
