@@ -9,7 +9,7 @@ import jax
 import jax.numpy as jnp
 import numpy as np
 import pytest
-from brdfit.special import expm1_ratio, log1p_ratio
+from brdfit.special import expm1_ratio, lambert_w, log1p_ratio, sine
 from mpmath import mp, mpf
 
 NEAR = np.concatenate([[0.0], *([s * 10.0**e for s in (1, -1)] for e in (-300.0, -15.0, -12.0, -8.0, -5.0, -3.0, -1.5))])
@@ -71,3 +71,26 @@ def test_single_precision(f: Callable[[Any], Any]):
     assert got.dtype == np.float32
     np.testing.assert_allclose(got, derivatives(f, x.astype(float))[0], rtol=4 * np.finfo(np.float32).eps)
     assert np.isfinite(np.asarray(jax.vmap(jax.grad(jax.grad(f)))(jnp.asarray(x)))).all()
+
+
+def test_lambert_w():
+    """W and its two derivatives from 0 to where e^W would overflow."""
+    x = np.array([1e-250, 1e-30, 1e-12, 1e-3, 0.3, 1.0, 2.7, 10.0, 1e4, 1e30, 1e250])
+    w = [mp.lambertw(mpf(float(t))).real for t in x]
+    slope = [mp.exp(-y) / (1 + y) for y in w]
+    bend = [-mp.exp(-2 * y) * (2 + y) / (1 + y) ** 3 for y in w]
+    for got, want in zip(derivatives(lambert_w, x), (w, slope, bend), strict=True):
+        np.testing.assert_allclose(got, [float(y) for y in want], rtol=1e-12, atol=1e-300)
+    value, first, second = derivatives(lambert_w, np.zeros(1))
+    assert (value[0], first[0]) == (0, 1)
+    assert np.isfinite(second[0])
+
+
+def test_sine():
+    """The sine of a cosine, and no infinite derivative where the sine is 0."""
+    value, first, second = derivatives(sine, np.array([0.0, 0.6, 1 - 1e-12, 1.0]))
+    np.testing.assert_allclose(value[:2], [1, 0.8], rtol=1e-15)
+    assert value[2] == pytest.approx(1.414213562e-6, rel=1e-4)  # 1 - 1e-12 is a rounding of 1e-16 off
+    assert value[3] > 0
+    assert np.isfinite(first).all()
+    assert np.isfinite(second).all()
