@@ -1,14 +1,14 @@
 """What a scene calls for: its picture with the measured table, with models, and with no more of a model than it shows."""
 
+from .appearance import look, weighted
 from .illumination import illuminate
-from .look import look, weighted
-from .measured import Measured, measured
+from .interpolated import Measured, measured
 from .page import write_scene
+from .pixels import View, view
 from .read import load_scene
-from .render import Rendered, render
+from .rendering import Rendered, render
 from .scene import Scene
-from .study import PIECES, Study, study
-from .view import View, view
+from .survey import PIECES, Study, study
 
 __all__ = [
     "PIECES",

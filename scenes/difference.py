@@ -10,8 +10,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ..reports.colours import delta_e, encode, library, screen
+from .pixels import View
 from .scene import Reals
-from .view import View
 
 WHITE = 100.0
 """Luminance of white on the screen, cd/m^2: a surface of mean 0.8 is shown at 80."""

@@ -14,8 +14,8 @@ from jaxtyping import Array, Float
 
 from ..polar import PolarStencil
 from ..reports.physics import FINE, hemisphere
+from .pixels import View, to_local
 from .scene import Ambient, Area, Directional, Environment, Point, Reals, Scene, Vector, unit
-from .view import View, to_local
 
 
 class Punctual(eqx.Module):

@@ -8,7 +8,7 @@ import jax
 import numpy as np
 
 from ..angles import directions
-from .render import cast
+from .rendering import cast
 
 THETA_D = np.radians(20)
 NARROWEST, WIDEST = 0.002, 1.0

@@ -19,7 +19,7 @@ from .difference import delta_itp, difference
 from .images import write_exr
 from .plots import difference_map, ladder, picture, scale, scene_map
 from .scene import MEASURES
-from .study import Study
+from .survey import Study
 
 PAGE, NUMBERS, PICTURES = "scene.html", "scene.json", "scene.exr"
 TOP = 10.0

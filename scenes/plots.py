@@ -13,8 +13,8 @@ from ..reports.colours import encode, screen
 from ..reports.plots import as_svg, new_figure, styled
 from ..tables import HalfDifferenceGrid
 from .choose import Tried
+from .pixels import View
 from .scene import MEASURES, Reals, Tolerance
-from .view import View
 
 GREY = 0.93
 """What is beside the object, on the page."""

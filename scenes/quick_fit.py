@@ -22,10 +22,16 @@ from ..geometry import Geometry, from_directions
 from ..models import BRDF, parameter_values, parameters_of
 from ..polar import PolarStencil
 from ..programs import program
+from ..tables import Table
+from ..tradeoff.sample import Sample, draw
 from .scene import Reals
 from .seen import Seen, pq
 
 PAIRS = 2048
+ELSEWHERE, SHARE = 512, 0.02
+"""Cells of the whole table, and their share of the weight."""
+OUTERMOST = 80.0
+"""Largest polar angle of such cells, degrees."""
 STARTS = 4
 NEARBY = 2
 """Starts that are polished where a model with one effect less or more says where to look."""
@@ -43,6 +49,7 @@ class Shown(eqx.Module):
     """Shown value of the pixel for each unit of BRDF."""
     signal: Float[Array, "n C"]
     """PQ signal of the measured pixel."""
+    root_weight: Float[Array, " n"]
 
 
 @dataclass(frozen=True, eq=False)
@@ -51,18 +58,30 @@ class Quick:
 
     model: BRDF
     error: float
-    """RMS difference of the PQ signal over pairs and channels, times 720: comparable to ΔE ITP."""
+    """RMS difference of the PQ signal over weighted pairs and channels, times 720: comparable to ΔE ITP."""
 
 
-def shown(seen: Seen) -> Shown:
-    """The pairs of a scene ready to be fitted, in float64: :data:`PAIRS` of them, whatever the scene."""
+def shown(seen: Seen, table: Table) -> Shown:
+    """The pairs of a scene ready to be fitted, in float64: :data:`PAIRS` of them, whatever the scene.
+
+    Together with :data:`ELSEWHERE` cells of the whole table, which keep a model from doing anything at all where pairs of
+    the scene do not happen to lie: as if lit so that a white Lambertian surface that faces the light shows 0.8.
+    """
     few = seen.draw(PAIRS)
+    rest = draw(table, OUTERMOST, "solid_angle")
+    rest = Sample(rest.wi[:ELSEWHERE], rest.wo[:ELSEWHERE], rest.measured[:ELSEWHERE], OUTERMOST)
+    wi, wo = np.concatenate([few.wi, rest.wi]), np.concatenate([few.wo, rest.wo])
+    elsewhere = 0.8 * np.pi * rest.measured * rest.wi[:, 2:]
+    scale = np.concatenate(
+        [few.pixel / np.maximum(few.measured, 1e-9), np.broadcast_to(0.8 * np.pi * rest.wi[:, 2:], elsewhere.shape)]
+    )
+    weight = np.concatenate([np.full(PAIRS, (1 - SHARE) / PAIRS), np.full(ELSEWHERE, SHARE / ELSEWHERE)])
     with jax.enable_x64(True):
-        g: Any = from_directions(jnp.asarray(few.wi), jnp.asarray(few.wo))
-        stencils = tuple(jax.tree.map(jnp.asarray, PolarStencil.of(w[:, 2], LIMIT)) for w in (few.wi, few.wo))
+        g: Any = from_directions(jnp.asarray(wi), jnp.asarray(wo))
+        stencils = tuple(jax.tree.map(jnp.asarray, PolarStencil.of(w[:, 2], LIMIT)) for w in (wi, wo))
         g = replace(g, stencil_i=stencils[0], stencil_o=stencils[1])
-        scale = few.pixel / np.maximum(few.measured, 1e-9)
-        return Shown(g, jnp.asarray(scale), pq(jnp.asarray(few.pixel)))
+        signal = pq(jnp.concatenate([jnp.asarray(few.pixel), jnp.asarray(elsewhere)]))
+        return Shown(g, jnp.asarray(scale), signal, jnp.sqrt(jnp.asarray(weight)))
 
 
 def quick_fit(cls: type[BRDF], data: Shown, summary: Summary, near: BRDF | None = None) -> Quick:
@@ -94,7 +113,7 @@ def quick_fit(cls: type[BRDF], data: Shown, summary: Summary, near: BRDF | None 
             p.name: np.array([float(v[p.name]) for v in values]) if p.per_channel else np.asarray(float(values[0][p.name]))
             for p in parameters_of(cls)
         }
-    return Quick(cls(**parameters), 720 * float(np.sqrt(2 * best.cost / data.scale.size)))
+    return Quick(cls(**parameters), 720 * float(np.sqrt(2 * best.cost / channels)))
 
 
 def _moved(start: Named, known: Named) -> Named:
@@ -134,7 +153,7 @@ def _linearise(data: Shown, x: Array, chart: Chart) -> Array:
         own, shared = chart.split(x, data.scale.shape[1])
         models = [chart.model(list(o), list(shared)) for o in own]
         f = jnp.stack([jnp.broadcast_to(m.evaluate(data.geometry), data.scale.shape[:1]) for m in models], -1)
-        r = (pq(jnp.maximum(f * data.scale, 0)) - data.signal).ravel()
+        r = (data.root_weight[:, None] * (pq(jnp.maximum(f * data.scale, 0)) - data.signal)).ravel()
         return r, r
 
     jacobian, r = jax.jacfwd(residual, has_aux=True)(x)

@@ -19,8 +19,8 @@ from ..reports.colours import luminance
 from ..tables import HalfDifferenceGrid
 from .difference import WHITE
 from .illumination import Extended, Illumination
-from .measured import Measured
-from .render import Rendered, cast
+from .interpolated import Measured
+from .rendering import Rendered, cast
 from .sampling import drawn, techniques_of
 from .scene import Reals
 

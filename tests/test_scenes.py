@@ -7,10 +7,11 @@ import pytest
 from brdfit.angles import half_difference
 from brdfit.reports.gather import interpolate
 from brdfit.scenes.illumination import illuminate
-from brdfit.scenes.measured import Measured, measured
-from brdfit.scenes.measured import half_difference as traced_half_difference
+from brdfit.scenes.interpolated import Measured, measured
+from brdfit.scenes.interpolated import half_difference as traced_half_difference
+from brdfit.scenes.pixels import view
 from brdfit.scenes.ready import Ready, ready
-from brdfit.scenes.render import cast, radiance, render
+from brdfit.scenes.rendering import cast, radiance, render
 from brdfit.scenes.scene import (
     Ambient,
     Camera,
@@ -24,7 +25,6 @@ from brdfit.scenes.scene import (
     unit,
 )
 from brdfit.scenes.surface import frames, intersect
-from brdfit.scenes.view import view
 
 SMALL = Camera(pixels=(48, 48))
 TILTED = Camera(eye=(1.0, 2.0, 6.0), pixels=(48, 40), width=None, field=35.0)

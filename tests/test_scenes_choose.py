@@ -9,13 +9,13 @@ import numpy as np
 import pytest
 from brdfit.models.effects import EFFECTS
 from brdfit.reports.colours import luminance
+from brdfit.scenes.appearance import look, weighted
 from brdfit.scenes.choose import choose, possible, smaller, without
 from brdfit.scenes.difference import delta_itp, difference, ssim
 from brdfit.scenes.illumination import illuminate
-from brdfit.scenes.look import look, weighted
+from brdfit.scenes.pixels import view
 from brdfit.scenes.scene import Ambient, Camera, Directional, Point, Scene, Sphere, Tolerance
 from brdfit.scenes.seen import pq, visibility
-from brdfit.scenes.view import view
 from brdfit.tradeoff.evaluation import Operations
 
 AMONG = ("body", "lobe", "tail", "fresnel", "masking", "second_lobe")

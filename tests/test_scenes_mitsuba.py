@@ -15,9 +15,9 @@ from brdfit.models.fresnel import conductor
 from brdfit.models.masking import smith_separable
 from brdfit.models.microfacet import microfacet
 from brdfit.scenes.illumination import illuminate
-from brdfit.scenes.render import render
+from brdfit.scenes.pixels import view
+from brdfit.scenes.rendering import render
 from brdfit.scenes.scene import Area, Camera, Directional, Environment, Plane, Scene, Sphere
-from brdfit.scenes.view import view
 
 mitsuba = pytest.importorskip("mitsuba", reason="compares with Mitsuba 3, which is not installed: pip install mitsuba")
 

@@ -5,10 +5,10 @@ import jax
 import numpy as np
 import pytest
 from brdfit.scenes.illumination import illuminate
-from brdfit.scenes.render import render
+from brdfit.scenes.pixels import view
+from brdfit.scenes.rendering import render
 from brdfit.scenes.sampling import draw_cosine, draw_lobe, draw_sky, lobe_density, sky_pixel
 from brdfit.scenes.scene import Ambient, Area, Camera, Environment, Plane, Point, Scene, Sphere
-from brdfit.scenes.view import view
 
 SMALL = Camera(pixels=(32, 32))
 WARD = brdfit.model("ward", diffuse=[0.2, 0.1, 0.05], specular=0.2, alpha=0.25)

@@ -10,12 +10,12 @@ import numpy as np
 from ..models import model
 from ..tables import HalfDifferenceGrid, Table
 from .illumination import Illumination, illuminate
+from .interpolated import measured
 from .lobe import lobe_alpha
-from .measured import measured
-from .render import Rendered, render
+from .pixels import View, view
+from .rendering import Rendered, render
 from .scene import Reals, Scene
 from .seen import Seen, seen
-from .view import View, view
 
 MEAN = 0.8
 """What the mean of a white Lambertian surface is shown as, where a scene does not set its exposure."""
