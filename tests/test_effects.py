@@ -384,9 +384,9 @@ def test_every_pair_of_effects_that_goes_together_evaluates():
 # Corners --------------------------------------------------------------------------------------------------------------
 
 CORNERS = (
-    "body+rough_body+lobe+fresnel+masking+trade_off+retro",
-    "lobe+tail+second_lobe+anisotropy+fresnel+masking",
-    "body+lobe+fresnel+masking+interreflection",
+    "body+rough_body+lobe+fresnel+trade_off+retro",
+    "lobe+tail+anisotropy+masking",
+    "lobe+masking+interreflection",
     "diffraction+fresnel",
 )
 ENDS: dict[str, tuple[float, ...]] = {
@@ -447,33 +447,39 @@ def test_single_precision(name: str):
 # Energy ---------------------------------------------------------------------------------------------------------------
 
 
-def albedo(name: str, theta: float, **parameters: float) -> float:
-    """Directional albedo at theta degrees by 300 x 100 nodes in the half vector."""
-    light, viewer, weight = hemisphere(np.radians(theta), (300, 100))
+ANGLES = np.array([0.0, 30.0, 60.0, 80.0, 85.0])
+_first_channel = jax.jit(lambda m, a, b: m(a, b)[:, 0])
+
+
+@cache
+def _directions(thetas: tuple[float, ...]) -> tuple[Reals, Reals, Reals]:
+    rules = [hemisphere(np.radians(t), (300, 100)) for t in thetas]
+    light = np.concatenate([np.broadcast_to(a, b.shape) for a, b, _ in rules])
+    return light, np.concatenate([b for _, b, _ in rules]), np.stack([w for _, _, w in rules])
+
+
+def albedo(name: str, thetas: Reals = ANGLES, **parameters: float) -> Reals:
+    """Directional albedo at angles in degrees by 300 x 100 nodes in the half vector."""
+    light, viewer, weight = _directions(tuple(thetas))
     with jax.enable_x64(True):
         m = brdfit.model(name, **{k: [v] if k in ("diffuse", "specular") else v for k, v in parameters.items()})
-        f = np.asarray(jax.jit(lambda m, a, b: m(a, b)[:, 0])(m, np.broadcast_to(light, viewer.shape), viewer))
-    return float(weight @ f)
+        f = np.asarray(_first_channel(m, light, viewer))
+    return np.sum(weight * f.reshape(weight.shape), 1)
 
 
 @pytest.mark.parametrize("alpha", [0.05, 0.1, 0.3, 0.6, 1.0])
 def test_white_furnace(alpha: float):
     """A lobe that reflects all, with interreflection, returns all light: to 5e-4 up to 85 degrees. Without, it does not."""
-    for theta in (0.0, 30.0, 60.0, 80.0, 85.0):
-        full = albedo("lobe+masking+interreflection", theta, specular=1.0, alpha=alpha)
-        assert full == pytest.approx(1, abs=5e-4), theta
-    assert albedo("lobe+masking", 60.0, specular=1.0, alpha=1.0) < 0.6
+    np.testing.assert_allclose(albedo("lobe+masking+interreflection", specular=1.0, alpha=alpha), 1, atol=5e-4)
+    missing = 1 - albedo("lobe+masking", specular=1.0, alpha=alpha)
+    assert missing.max() > 0.05
 
 
 def test_energy():
     """At most all light comes back: with the trade-off of a perfect body, with interreflection of a metal with a tail."""
-    for theta in (0.0, 45.0, 75.0, 88.0):
-        assert albedo("body+lobe+fresnel+masking+trade_off", theta, diffuse=1.0, specular=0.3, alpha=0.2) <= 1
-        assert albedo("lobe+tail+fresnel+masking+interreflection", theta, specular=0.9, alpha=0.2, gamma=1.5) <= 1
-    # 1e-3: quadrature of a tail
-    assert albedo("lobe+tail+masking+interreflection", 30.0, specular=1.0, alpha=0.3, gamma=1.5) == pytest.approx(
-        1, abs=1e-3
-    )
+    assert albedo("body+lobe+fresnel+masking+trade_off", diffuse=1.0, specular=0.3, alpha=0.2).max() <= 1
+    full = albedo("lobe+tail+masking+interreflection", specular=1.0, alpha=0.3, gamma=1.5)
+    np.testing.assert_allclose(full, 1, atol=1e-3)  # the quadrature of a tail
 
 
 def test_compensation_of_a_colour():
@@ -482,31 +488,28 @@ def test_compensation_of_a_colour():
     """
     x, w = np.polynomial.legendre.leggauss(12)
     mu = (x + 1) / 2
-    mean = sum(
-        wk * m * albedo("lobe+masking", float(np.degrees(np.arccos(m))), specular=1.0, alpha=0.6)
-        for m, wk in zip(mu, w, strict=True)
-    )
+    mean = np.sum(w * mu * albedo("lobe+masking", np.degrees(np.arccos(mu)), specular=1.0, alpha=0.6))
     f = 0.4
     share = f**2 * mean / (1 - f * (1 - mean))
 
-    def extra(specular: float) -> float:
-        with_it = albedo("lobe+masking+interreflection", 40.0, specular=specular, alpha=0.6)
-        return with_it - albedo("lobe+masking", 40.0, specular=specular, alpha=0.6)
+    def extra(specular: float) -> Reals:
+        with_it = albedo("lobe+masking+interreflection", specular=specular, alpha=0.6)
+        return with_it - albedo("lobe+masking", specular=specular, alpha=0.6)
 
     # 2e-3: 12 nodes for the mean
-    assert extra(f) / extra(1.0) == pytest.approx(share, rel=2e-3)
+    np.testing.assert_allclose(extra(f) / extra(1.0), share, rtol=2e-3)
 
 
 # Dispersion, stretching -----------------------------------------------------------------------------------------------
 
 
 def test_dispersion_is_one_lobe_a_channel():
-    numbers = truth_of("body+lobe+tail+dispersion+fresnel+masking")
+    numbers = truth_of("body+lobe+dispersion+fresnel+masking")
     with jax.enable_x64(True):
-        together = np.asarray(brdfit.model("body+lobe+tail+dispersion+fresnel+masking", **numbers)(WI, WO))
+        together = np.asarray(brdfit.model("body+lobe+dispersion+fresnel+masking", **numbers)(WI, WO))
         for k in range(3):
             one = {n: [v[k]] if n in ("diffuse", "specular") else v[k] for n, v in numbers.items()}
-            alone = np.asarray(brdfit.model("body+lobe+tail+fresnel+masking", **one)(WI, WO))
+            alone = np.asarray(brdfit.model("body+lobe+fresnel+masking", **one)(WI, WO))
             np.testing.assert_allclose(together[:, k : k + 1], alone, rtol=1e-12)
 
 
@@ -524,9 +527,8 @@ def test_anisotropy_of_equal_widths_is_round():
 RECOVERED = (
     "body+lobe+second_lobe+fresnel",
     "body+lobe+fresnel+masking+interreflection+trade_off",
-    "body+lobe+anisotropy+fresnel+masking",
-    "body+rough_body+lobe+dispersion+retro",
-    "body+diffraction+fresnel",
+    "body+lobe+anisotropy+fresnel",
+    "body+rough_body+lobe+dispersion+diffraction+retro",
 )
 
 
