@@ -68,7 +68,7 @@ def shown(seen: Seen, table: Table) -> Shown:
     the scene do not happen to lie: as if lit so that a white Lambertian surface that faces the light shows 0.8.
     """
     few = seen.draw(PAIRS)
-    rest = draw(table, OUTERMOST, "solid_angle")
+    rest = draw(table, OUTERMOST, "cells")  # every theta_h alike: narrow spikes are seen, too
     rest = Sample(rest.wi[:ELSEWHERE], rest.wo[:ELSEWHERE], rest.measured[:ELSEWHERE], OUTERMOST)
     wi, wo = np.concatenate([few.wi, rest.wi]), np.concatenate([few.wo, rest.wo])
     elsewhere = 0.8 * np.pi * rest.measured * rest.wi[:, 2:]
