@@ -6,7 +6,6 @@ import time
 from dataclasses import dataclass
 
 from ..fitting import Fit, fit_many
-from ..models import MODELS
 from ..progress import Progress
 from ..tables import Table
 from .advice import fresnel_advice, masking_advice, quadrature_advice, rendering_advice, settings_advice
@@ -15,6 +14,9 @@ from .rendering import Rendering, renderings
 from .sample import draw
 from .settings import Setting, settings
 from .smith import Quadrature, quadratures
+
+MODELS = ("gtr", "abc", "sgd", "ward", "ashikhmin_shirley", "lambert")
+"""What is compared: the models that are fitted by default, and a body without a lobe. All there are would take minutes."""
 
 PIECES = len(MODELS) + 5
 """Steps that :func:`tradeoff` reports to a progress."""
