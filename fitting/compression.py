@@ -56,22 +56,24 @@ class RowRules:
         """Weights ``[H, D, k]``."""
         return np.asarray(self.weights[self.pattern] * self.scale[..., None])
 
-    def compress(self, transformed: Reals, at: slice) -> tuple[Reals, Reals]:
-        """Values ``[C, h, D, k]`` at the nodes of the rows ``at`` of theta_h, ``[C, h, D, P]``, and the weighted square sum
-        ``[C]`` that they stand for.
+    def groups(self, count: int) -> list[NDArray[np.intp]]:
+        """Rows, numbered over ``[H, D]``, in so many parts in which those of one rule stand together."""
+        return np.array_split(np.argsort(self.pattern.ravel(), kind="stable"), count)
+
+    def compress(self, transformed: Reals, rows: NDArray[np.intp]) -> tuple[Reals, Reals]:
+        """Values ``[C, rows, k]`` at the nodes of ``rows``, a part of :meth:`groups`, from their transformed values
+        ``[C, rows, P]``; and the weighted square sum ``[C]`` that they stand for.
         """
-        c, h, d, _ = transformed.shape
-        k = self.nodes.shape[1]
-        rows = transformed.reshape(c, h * d, -1)
-        out = np.zeros((c, h * d, k))
-        kept = np.zeros(c)
-        pattern, scale = self.pattern[at].ravel(), self.scale[at].ravel()
-        for rule in np.unique(pattern):
-            same = np.flatnonzero(pattern == rule)
-            coefficients = rows[:, same] @ self.analysis[rule]
+        pattern, scale = self.pattern.ravel()[rows], self.scale.ravel()[rows]
+        out = np.empty((*transformed.shape[:2], self.nodes.shape[1]))
+        kept = np.zeros(len(out))
+        starts = np.flatnonzero(np.diff(pattern, prepend=-1))
+        for same in map(slice, starts, [*starts[1:], len(rows)]):
+            rule = pattern[same.start]
+            coefficients = transformed[:, same] @ self.analysis[rule]
             out[:, same] = coefficients @ self.synthesis[rule]
             kept += (coefficients**2).sum(-1) @ scale[same]
-        return out.reshape(c, h, d, k), kept
+        return out, kept
 
 
 MIDDLE = np.pi / 2 + 1e-9

@@ -191,8 +191,8 @@ def _grid_samples(
     return Samples(Blocks(geometry, jnp.asarray(measured), fold(weight[part])), banded=fold.banded, band_axes=(0, 2))
 
 
-CHUNK = 10
-"""Rows of theta_h that are transformed at a time."""
+GROUPS = 8
+"""Parts of the table that are compressed side by side."""
 
 
 def compress(whole: Samples, table: Table, used: NDArray[np.bool_], max_angle: float, loss: Loss) -> Samples:
@@ -202,7 +202,7 @@ def compress(whole: Samples, table: Table, used: NDArray[np.bool_], max_angle: f
     The same samples where that is not possible: scattered samples, short rows, losses without a transform.
     """
     grid = table.layout
-    transform = loss.transform
+    transform: Any = loss.transform
     if transform is None or loss.inverse is None or not isinstance(grid, HalfDifferenceGrid) or not grid.isotropic:
         return whole
     limit = float(np.radians(max_angle))
@@ -213,33 +213,39 @@ def compress(whole: Samples, table: Table, used: NDArray[np.bool_], max_angle: f
         return whole
     h, d = grid.theta_h[rows[0], None, None], grid.theta_d[None, rows[1], None]
     weight = fold.unfold(np.asarray(whole.cells.weight))
-    chunks = [slice(i, i + CHUNK) for i in range(0, len(h), CHUNK)]
-
-    def geometry(at: slice) -> Geometry:
-        return _plain_geometry(h[at], d, grid.phi_d, weight[at] > 0)
-
+    g = _plain_geometry(h, d, grid.phi_d, weight > 0)
     if loss.weigh is not None:
-        for at in chunks:
-            weight[at] *= np.asarray(loss.weigh(geometry(at)))
+        weight *= np.asarray(loss.weigh(g))
     rules = row_rules(np.where(grid.phi_d > np.pi, 2 * np.pi - grid.phi_d, grid.phi_d), weight, k)
 
-    def reduced(at: slice) -> tuple[Reals, Reals]:
-        """Values at the nodes of some rows, and the square sum that they leave out."""
-        part = np.ix_(rows[0][at], rows[1])
-        planes = np.stack([np.where(used[part], plane[part], 0.0) for plane in table.planes])
-        transformed = np.asarray(transform(jnp.asarray(planes), geometry(at)))
-        values, kept = rules.compress(transformed, at)
-        return values, np.einsum("hdp,chdp,chdp->c", weight[at], transformed, transformed) - kept
+    def row_by_row(a: np.ndarray) -> np.ndarray:
+        """``[H D, P]`` of ``[H, D, P]``; axes that it does not depend on may have length 1."""
+        return np.broadcast_to(a, (*weight.shape[:2], a.shape[-1])).reshape(-1, a.shape[-1])
 
-    parts = list(in_threads(reduced, chunks))
+    part = np.ix_(*rows)
+    fitted, share = row_by_row(used[part]), row_by_row(weight)
+    values = [row_by_row(plane[part]) for plane in table.planes]
+
+    def reduced(at: NDArray[np.intp]) -> tuple[Reals, Reals]:
+        """Values at the nodes of some rows, and the square sum that they leave out."""
+        planes = np.stack([np.where(fitted[at], plane[at], 0.0) for plane in values])
+        transformed = np.asarray(transform(planes, jax.tree.map(lambda a: row_by_row(a)[at], g)))
+        at_nodes, kept = rules.compress(transformed, at)
+        return at_nodes, np.einsum("rp,crp,crp->c", share[at], transformed, transformed) - kept
+
+    groups = rules.groups(GROUPS)
+    parts = list(in_threads(reduced, groups))
     remainder = np.sum([left_out for _, left_out in parts], 0)
+    at_rows = np.empty((table.channels, *share.shape[:1], k))
+    for at, (of_rows, _) in zip(groups, parts, strict=True):
+        at_rows[:, at] = of_rows
     node_weight = rules.weight
     at_nodes = _plain_geometry(h, d, rules.phi, node_weight > 0)
-    values = np.asarray(loss.inverse(jnp.asarray(np.concatenate([values for values, _ in parts], 1)), at_nodes))
+    nodal = np.asarray(loss.inverse(jnp.asarray(at_rows.reshape(table.channels, *rules.phi.shape)), at_nodes))
     relative = loss.weight(at_nodes)
     node_weight = node_weight if relative is None else node_weight / np.asarray(relative)
     nodes = _Fold((*(len(r) for r in rows), k), k)
-    blocks = Blocks(_folded(at_nodes, nodes, limit), nodes(values), nodes(node_weight))
+    blocks = Blocks(_folded(at_nodes, nodes, limit), nodes(nodal), nodes(node_weight))
     return Samples(whole.cells, whole.banded, whole.band_axes, blocks, jnp.asarray(np.maximum(remainder, 0.0)))
 
 
