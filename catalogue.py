@@ -1,4 +1,4 @@
-"""Every model with its parameters, and every loss, as data and as text."""
+"""Every model with its parameters, every effect and every loss, as data and as text."""
 
 from __future__ import annotations
 
@@ -6,12 +6,12 @@ import math
 from typing import Any
 
 from .fitting.losses import LOSSES
-from .models import MODELS, parameters_of
+from .models import EFFECTS, MODELS, parameters_of
 from .references import REFERENCES
 
 
 def catalogue() -> dict[str, Any]:
-    """Models and losses as JSON values; an end of a range that is infinite is null."""
+    """Models, effects and losses as JSON values; an end of a range that is infinite is null."""
     return {
         "models": [
             {
@@ -35,6 +35,16 @@ def catalogue() -> dict[str, Any]:
             for name, forms in MODELS.items()
             for cls in forms
         ],
+        "effects": [
+            {
+                "name": e.name,
+                "meaning": e.meaning,
+                "formula": e.formula,
+                "needs": list(e.needs),
+                "references": [REFERENCES[key] for key in e.references],
+            }
+            for e in EFFECTS.values()
+        ],
         "losses": [{"name": loss.name, "source": REFERENCES.get(loss.source, loss.source)} for loss in LOSSES.values()],
     }
 
@@ -50,7 +60,11 @@ def text() -> str:
                 searched = f"searched [{p.search[0]:g}, {p.search[1]:g}]"
                 lines.append(f"    {p.name:12s} {p.meaning}; unit {p.unit}, {shape}, range {p.valid}, {searched}")
             lines += [f"    {REFERENCES[key]}" for key in cls.references] + [""]
-    lines += ["losses", *(f"    {loss.name:12s} {REFERENCES.get(loss.source, '')}" for loss in LOSSES.values())]
+    lines += ["effects, to be joined by +"]
+    for effect in EFFECTS.values():
+        needs = f"; needs {', '.join(effect.needs)}" if effect.needs else ""
+        lines += [f"    {effect.name:15s} {effect.meaning}{needs}"]
+    lines += ["", "losses", *(f"    {loss.name:12s} {REFERENCES.get(loss.source, '')}" for loss in LOSSES.values())]
     return "\n".join(lines)
 
 
