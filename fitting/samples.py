@@ -292,9 +292,9 @@ def _grid_geometry(
     cos_i, cos_o = HalfDifferenceGrid(h, d, p, h, d, p).polar_cosines()
     valid = (cos_i >= np.cos(limit) - 1e-12) & (cos_o >= np.cos(limit) - 1e-12)
     rows = np.flatnonzero(valid.any((1, 2))), np.flatnonzero(valid.any((0, 2)))
+    del cos_i, cos_o  # two copies of the grid
     # Guard: cells that are not fitted have weight 0, and 0 * inf = NaN: they get a harmless direction
     # (tests/test_samples.py::test_unused_cells_are_harmless).
-    del cos_i, cos_o  # two copies of the grid
     g = _plain_geometry(h[rows[0], None, None], d[None, rows[1], None], p, valid[np.ix_(*rows)])
     return _folded(g, _Fold(g.cos_i.shape, along_phi), limit), rows
 
@@ -306,9 +306,7 @@ def _scattered_samples(table: Table, used: NDArray[np.bool_], weight: Reals, lim
     banded = slots.shape[1:]
     slots = slots.reshape(len(slots), -1)
     fitted = slots >= 0
-    normal = np.array([0.0, 0.0, 1.0])
-    # Guard: empty slots hold the normal direction with weight 0, so that nothing divides by zero.
-    wi, wo = (np.where(fitted[..., None], v[slots], normal) for v in (wi, wo))
+    wi, wo = wi[slots], wo[slots]  # an empty slot, -1, repeats the last direction, with weight 0
     g: Any = from_directions(wi, wo)
     if table.isotropic:
         g = replace(g, h_x2=None, h_y2=None, light=None, viewer=None)

@@ -24,7 +24,8 @@ class Ready(eqx.Module):
         """BRDF in 1/sr at unit vectors ``[..., 3]``; 0 below the horizon."""
         wi, wo = jnp.broadcast_arrays(jnp.asarray(wi), jnp.asarray(wo))
         above = (wi[..., 2] > 0) & (wo[..., 2] > 0)
-        # Guard: below the horizon there is no polar angle to look up, and models divide by the cosines.
+        # Guard: below the horizon there is no polar angle to look up, and models divide by the cosines
+        # (tests/test_scenes.py::test_ready_below_the_horizon).
         normal = jnp.zeros(3, wi.dtype).at[2].set(1)
         wi, wo = (jnp.where(above[..., None], w, normal) for w in (wi, wo))
         return jnp.where(above[..., None], from_table(LIMIT)(self.what, wi, wo), 0)

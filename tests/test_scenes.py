@@ -2,6 +2,7 @@
 
 import brdfit
 import jax
+import jax.numpy as jnp
 import numpy as np
 import pytest
 from brdfit.angles import half_difference
@@ -196,6 +197,18 @@ def test_ready_reads_the_integral_from_a_table():
     np.testing.assert_allclose(render(fast, light, dtype="float64").values, exact, rtol=1e-8)
     np.testing.assert_allclose(render(fast, light).values, exact, rtol=1e-5, atol=1e-7)
     assert ready(WARD) is WARD
+
+
+def test_ready_below_the_horizon():
+    """0, and so are all derivatives, where light or viewer lie on the horizon, below it, or opposite each other."""
+    fast = ready(brdfit.model("gtr", diffuse=0.1, specular=0.3, alpha=0.2, gamma=1.5))
+    up, down, side = np.array([[0.6, 0, 0.8], [0.6, 0, -0.8], [1.0, 0, 0]])
+    pairs = [(up, down), (down, up), (down, down), (up, side), (side, up), (side, -side), (up, -up)]
+    wi, wo = np.array(pairs).swapaxes(0, 1)
+    with jax.enable_x64(True):
+        value, slopes = jax.value_and_grad(lambda a, b: fast(a, b).sum(), (0, 1))(jnp.asarray(wi), jnp.asarray(wo))
+    np.testing.assert_array_equal(value, 0)
+    np.testing.assert_array_equal(slopes, 0)
 
 
 def test_opposite():

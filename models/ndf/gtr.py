@@ -78,7 +78,8 @@ class GTR(eqx.Module):
         below, above = jnp.where(narrow, share, rest), jnp.where(narrow, rest, share)
         z = below * jnp.expm1(e * m)
         far = z < -0.5
-        # Guard: the logarithm of what is left of 1 + z where it cancels, and 0/0 where it does not.
+        # Guard: the logarithm of what is left of 1 + z where it cancels, and 0/0 where it does not
+        # (tests/test_ndf.py::test_quantiles_of_gtr_at_both_ends).
         near = below * expm1_ratio(e * m) * log1p_ratio(jnp.where(far, 0, z))
         r = jnp.where(far, jnp.log(above + below * jnp.exp(e * m)) / jnp.where(far, e * m, 1), near)
         u = r * expm1_ratio(r * m) / expm1_ratio(m)
