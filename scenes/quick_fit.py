@@ -2,6 +2,9 @@
 
 The residual of a pair is the difference of the PQ signal of its pixel, PQ(L f/m) - PQ(L), for each channel: what the pixel
 would look like if all of its light came that way. Where one light makes a pixel, that is the difference that is seen.
+
+Under ambient light a spike narrower than the steps between the pairs is seen by none of them and still brightens every
+pixel. There the pixels themselves are fitted, too, by the albedo of the model at a few polar angles.
 """
 
 from __future__ import annotations
@@ -22,16 +25,21 @@ from ..geometry import Geometry, from_directions
 from ..models import BRDF, parameter_values, parameters_of
 from ..polar import PolarStencil
 from ..programs import program
-from ..tables import Table
+from ..reports.physics import COARSE, hemisphere
 from ..tradeoff.sample import Sample, draw
+from .appearance import Look
+from .interpolated import measured
+from .rendering import cast
 from .scene import Reals
-from .seen import Seen, pq
+from .seen import pq
 
 PAIRS = 2048
 ELSEWHERE, SHARE = 512, 0.02
 """Cells of the whole table, and their share of the weight."""
 OUTERMOST = 80.0
 """Largest polar angle of such cells, degrees."""
+PIXELS = 6
+"""Pixels whose integrals are fitted under ambient light."""
 STARTS = 4
 NEARBY = 2
 """Starts that are polished where a model with one effect less or more says where to look."""
@@ -41,15 +49,41 @@ RTOL = 1e-6
 LIMIT = np.pi / 2
 
 
+class Ambient(eqx.Module):
+    """Pixels under even light, whose integrals take ``nodes`` directions each."""
+
+    weight: Float[Array, "K nodes"]
+    """The albedo is the sum over nodes of weight times BRDF."""
+    scale: Float[Array, " C"]
+    """Shown value for each unit of albedo."""
+    rest: Float[Array, "K C"]
+    """Shown value that other light makes."""
+    signal: Float[Array, "K C"]
+    root_weight: Float[Array, " K"]
+
+
 class Shown(eqx.Module):
     """Pairs of directions, and what their pixels look like."""
 
     geometry: Geometry
+    """Of the n pairs, then of the K x nodes of :class:`Ambient`."""
     scale: Float[Array, "n C"]
     """Shown value of the pixel for each unit of BRDF."""
     signal: Float[Array, "n C"]
     """PQ signal of the measured pixel."""
     root_weight: Float[Array, " n"]
+    ambient: Ambient | None
+
+    def residual(self, f: Float[Array, "all C"]) -> Float[Array, "rows C"]:
+        """Weighted difference of the PQ signal of BRDF values at :attr:`geometry`, of the pairs and then of the pixels."""
+        n = len(self.scale)
+        r = self.root_weight[:, None] * (pq(jnp.maximum(f[:n] * self.scale, 0)) - self.signal)
+        if self.ambient is None:
+            return r
+        a = self.ambient
+        albedo = (a.weight[..., None] * f[n:].reshape(*a.weight.shape, -1)).sum(1)
+        values = pq(jnp.maximum(a.rest + albedo * a.scale, 0))
+        return jnp.concatenate([r, a.root_weight[:, None] * (values - a.signal)])
 
 
 @dataclass(frozen=True, eq=False)
@@ -61,14 +95,15 @@ class Quick:
     """RMS difference of the PQ signal over weighted pairs and channels, times 720: comparable to ΔE ITP."""
 
 
-def shown(seen: Seen, table: Table) -> Shown:
-    """The pairs of a scene ready to be fitted, in float64: :data:`PAIRS` of them, whatever the scene.
+def shown(here: Look) -> Shown:
+    """What a scene shows ready to be fitted, in float64: :data:`PAIRS` pairs, whatever the scene.
 
     Together with :data:`ELSEWHERE` cells of the whole table, which keep a model from doing anything at all where pairs of
-    the scene do not happen to lie: as if lit so that a white Lambertian surface that faces the light shows 0.8.
+    the scene do not happen to lie: as if lit so that a white Lambertian surface that faces the light shows 0.8. And with
+    :data:`PIXELS` pixels where there is ambient light.
     """
-    few = seen.draw(PAIRS)
-    rest = draw(table, OUTERMOST, "cells")  # every theta_h alike: narrow spikes are seen, too
+    few = here.seen.draw(PAIRS)
+    rest = draw(here.table, OUTERMOST, "cells")  # every theta_h alike: narrow spikes are seen, too
     rest = Sample(rest.wi[:ELSEWHERE], rest.wo[:ELSEWHERE], rest.measured[:ELSEWHERE], OUTERMOST)
     wi, wo = np.concatenate([few.wi, rest.wi]), np.concatenate([few.wo, rest.wo])
     elsewhere = 0.8 * np.pi * rest.measured * rest.wi[:, 2:]
@@ -76,12 +111,34 @@ def shown(seen: Seen, table: Table) -> Shown:
         [few.pixel / np.maximum(few.measured, 1e-9), np.broadcast_to(0.8 * np.pi * rest.wi[:, 2:], elsewhere.shape)]
     )
     weight = np.concatenate([np.full(PAIRS, (1 - SHARE) / PAIRS), np.full(ELSEWHERE, SHARE / ELSEWHERE)])
+    ambient = None
     with jax.enable_x64(True):
+        if here.light.everywhere is not None:
+            ambient, at, to = _ambient(here, np.asarray(here.light.everywhere.radiance))
+            weight *= 0.5
+            wi, wo = np.concatenate([wi, at]), np.concatenate([wo, to])
         g: Any = from_directions(jnp.asarray(wi), jnp.asarray(wo))
         stencils = tuple(jax.tree.map(jnp.asarray, PolarStencil.of(w[:, 2], LIMIT)) for w in (wi, wo))
         g = replace(g, stencil_i=stencils[0], stencil_o=stencils[1])
         signal = pq(jnp.concatenate([jnp.asarray(few.pixel), jnp.asarray(elsewhere)]))
-        return Shown(g, jnp.asarray(scale), signal, jnp.sqrt(jnp.asarray(weight)))
+        return Shown(g, jnp.asarray(scale), signal, jnp.sqrt(jnp.asarray(weight)), ambient)
+
+
+def _ambient(here: Look, radiance: Reals) -> tuple[Ambient, Reals, Reals]:
+    """Pixels that stand for equal numbers of them in the order of cos_o, with half of the weight, and their directions."""
+    order = np.argsort(here.view.wo[:, 2], kind="stable")
+    chosen = order[((np.arange(PIXELS) + 0.5) / PIXELS * len(order)).astype(int)]
+    rules = [hemisphere(float(np.arccos(c)), COARSE) for c in here.view.wo[chosen, 2]]
+    wi, weight = np.stack([r[1] for r in rules]), np.stack([r[2] for r in rules])
+    wo = np.broadcast_to(np.stack([r[0] for r in rules])[:, None], wi.shape)
+    # Guard: directions of no weight may lie below the horizon, where models are not defined; the normal stands for them.
+    wi = np.where(weight[..., None] > 0, wi, [0.0, 0.0, 1.0])
+    pixel = here.reference.values[chosen] * here.exposure
+    table = np.asarray(jax.jit(lambda m, i, o: m(i, o))(*cast((measured(here.table)[0], wi, wo), "float64")))
+    scale = radiance * here.exposure
+    rest = np.maximum(pixel - (weight[..., None] * table).sum(1) * scale, 0)
+    parts = (weight, scale, rest, pq(pixel), np.full(PIXELS, np.sqrt(0.5 / PIXELS)))
+    return Ambient(*(jnp.asarray(p) for p in parts)), wi.reshape(-1, 3), wo.reshape(-1, 3)
 
 
 def quick_fit(cls: type[BRDF], data: Shown, summary: Summary, near: BRDF | None = None) -> Quick:
@@ -152,8 +209,8 @@ def _linearise(data: Shown, x: Array, chart: Chart) -> Array:
     def residual(x: Array) -> tuple[Array, Array]:
         own, shared = chart.split(x, data.scale.shape[1])
         models = [chart.model(list(o), list(shared)) for o in own]
-        f = jnp.stack([jnp.broadcast_to(m.evaluate(data.geometry), data.scale.shape[:1]) for m in models], -1)
-        r = (data.root_weight[:, None] * (pq(jnp.maximum(f * data.scale, 0)) - data.signal)).ravel()
+        f = jnp.stack([jnp.broadcast_to(m.evaluate(data.geometry), data.geometry.shape) for m in models], -1)
+        r = data.residual(f).ravel()
         return r, r
 
     jacobian, r = jax.jacfwd(residual, has_aux=True)(x)
@@ -163,4 +220,4 @@ def _linearise(data: Shown, x: Array, chart: Chart) -> Array:
     return jnp.linalg.qr(jnp.where(jnp.isfinite(both), both, worst), mode="r")
 
 
-__all__ = ["Quick", "Shown", "quick_fit", "shown"]
+__all__ = ["Ambient", "Quick", "Shown", "quick_fit", "shown"]

@@ -56,7 +56,7 @@ def study(table: Table, scene: Scene, progress: Progress | None = None) -> Study
     progress.advance(f"{len(here.view.wo)} pixels of the object, exposure {here.exposure:.3g}")
     used = table.within(FITTED_ANGLE)
     summary = summarise(table, used if used.any() else table.mask)
-    bench = _Bench(here, shown(here.seen, table), summary)
+    bench = _Bench(here, shown(here), summary)
     progress.say("searching")
     among = [n for n in EFFECTS if n not in DEAR and (n != "anisotropy" or not table.isotropic)]
     choice = choose(bench, scene.tolerance, scene.budget, among)

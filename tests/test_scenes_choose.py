@@ -1,10 +1,12 @@
 """The search over effects with errors and costs that are known beforehand, and what a picture shows."""
 
+from dataclasses import replace
 from itertools import pairwise
 
 import brdfit
 import brdfit.angles
 import colour
+import jax
 import numpy as np
 import pytest
 from brdfit.models.effects import EFFECTS
@@ -13,7 +15,10 @@ from brdfit.scenes.appearance import look, weighted
 from brdfit.scenes.choose import choose, possible, smaller, without
 from brdfit.scenes.difference import delta_itp, difference, ssim
 from brdfit.scenes.illumination import illuminate
+from brdfit.scenes.interpolated import measured
 from brdfit.scenes.pixels import view
+from brdfit.scenes.quick_fit import shown
+from brdfit.scenes.rendering import render
 from brdfit.scenes.scene import Ambient, Camera, Directional, Point, Scene, Sphere, Tolerance
 from brdfit.scenes.seen import pq, visibility
 from brdfit.tradeoff.evaluation import Operations
@@ -177,6 +182,27 @@ def test_draws_follow_the_weights(here):
         share = steps[np.searchsorted(brdfit_theta_h(here.seen)[order], limit, side="right") - 1]
         assert abs((brdfit_theta_h(few) <= limit).mean() - share) <= 2 / 500
     assert few.weight.sum() == pytest.approx(1)
+
+
+def test_spikes_between_the_pairs_are_seen_under_ambient_light(small_table):
+    """The pixels that a fit sees differ as the pictures do, by the renderer's finer rule, for a lobe of 0.003 degrees."""
+    scene = Scene("", Sphere(), Camera(pixels=(24, 24)), (Directional((0.3, 0.4, 1.0), (3.0,) * 3), Ambient((0.7,) * 3)))
+    there = look(small_table[0], scene)
+    data = shown(there)
+    spike = brdfit.compose("body", "lobe")(diffuse=np.full(3, 0.1), specular=np.full(3, 0.5), alpha=np.asarray(6e-5))
+    with jax.enable_x64(True):
+        one = brdfit.compose("body", "lobe")(diffuse=0.1, specular=0.5, alpha=6e-5).evaluate(data.geometry)
+        got = np.asarray(data.residual(np.repeat(one[:, None], 3, 1)))
+    pixels = len(data.ambient.signal)
+    found = got[-pixels:] / np.asarray(data.ambient.root_weight)[:, None]
+    order = np.argsort(there.view.wo[:, 2], kind="stable")
+    at = order[((np.arange(pixels) + 0.5) / pixels * len(order)).astype(int)]
+    # ambient light alone changes: the spike does not meet the directional light
+    even = replace(there.light, punctual=())
+    after = (render(spike, even).values - render(measured(there.table)[0], even).values)[at] * there.exposure
+    expected = pq(there.reference.values[at] * there.exposure + after) - pq(there.reference.values[at] * there.exposure)
+    assert np.abs(expected).min() > 0.02  # 15 of ΔE ITP
+    np.testing.assert_allclose(found, expected, atol=2e-3)
 
 
 def brdfit_theta_h(pairs):
