@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import json
 from collections.abc import Sequence
-from dataclasses import dataclass, field, fields
+from dataclasses import asdict, dataclass, field, fields
 from pathlib import Path
 from typing import Any, get_type_hints
 
@@ -86,6 +86,18 @@ class Albedo:
 
 
 @dataclass(frozen=True)
+class Published:
+    """A fit of the same model to the same material in the literature."""
+
+    source: str
+    """Where it was published."""
+    reference: str
+    """Key of the citation."""
+    errors: dict[str, float]
+    """By loss, over the cells of the new fit."""
+
+
+@dataclass(frozen=True)
 class Evidence:
     """Everything that the plots of one material need. Parts that could not be made are None, with a word why."""
 
@@ -99,6 +111,8 @@ class Evidence:
     maps: Maps | None = None
     sphere: Sphere | None = None
     albedo: Albedo | None = None
+    published: dict[str, Published] = field(default_factory=dict)
+    """The published fits beside the new ones, by the names of these."""
     missing: dict[str, str] = field(default_factory=dict)
     """Why a part is missing, by its name."""
 
@@ -116,6 +130,7 @@ def save_evidence(out_dir: StrPath, evidence: Sequence[Evidence]) -> Path:
         for k, e in enumerate(evidence):
             group = file.create_group(f"{k:05d}")
             head = {n: getattr(e, n) for n in ("material", "source", "sha256", "keys", "channel_names", "missing")}
+            head["published"] = {key: asdict(p) for key, p in e.published.items()}
             group.attrs["about"] = json.dumps(head)
             for name in PARTS:
                 part = getattr(e, name)
@@ -171,6 +186,7 @@ def _read(group: Any) -> Evidence:
         sha256=head["sha256"],
         keys=tuple(head["keys"]),
         channel_names=tuple(head["channel_names"]),
+        published={key: Published(**p) for key, p in head.get("published", {}).items()},  # earlier files have none
         missing=head["missing"],
         **parts,
     )

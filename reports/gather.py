@@ -19,6 +19,7 @@ from .colours import channel_names, delta_e, exposure_of, screen
 from .evaluate import evaluate
 from .evidence import Albedo, Evidence, Lobes, Maps, Sphere
 from .physics import ANGLES, albedo_directions, albedo_of_values
+from .published_fits import published
 
 if TYPE_CHECKING:
     from ..fitting.result import Fit
@@ -93,6 +94,7 @@ class Views:
             maps=_maps(at_cells, self._cells_at),
             sphere=sphere(table, self._sphere_at, at_sphere, missing),
             albedo=_albedo(table, self._albedo_at, at_albedo),
+            published={fit_key(f): p for f, p in zip(fits, published(table, fits), strict=True) if p},
             missing=missing,
         )
 

@@ -11,7 +11,7 @@ import numpy as np
 
 from . import materials, physics, words
 from .colours import encode
-from .evidence import Evidence
+from .evidence import Evidence, Published
 from .gather import fit_key
 from .words import significant
 
@@ -67,8 +67,8 @@ def _hex(linear: np.ndarray) -> str:
     return "#" + "".join(f"{c:02x}" for c in code)
 
 
-def model_view(f: Fit, label: str, channel_names: tuple[str, ...]) -> View:
-    """The section of one model: formula, parameters with their error bars, remarks, time."""
+def model_view(f: Fit, label: str, channel_names: tuple[str, ...], published: Published | None) -> View:
+    """The section of one model: formula, parameters with their error bars, the published fit, remarks, time."""
     return {
         "label": label,
         "anchor": anchor(f, label),
@@ -76,6 +76,7 @@ def model_view(f: Fit, label: str, channel_names: tuple[str, ...]) -> View:
         "converged": f.converged,
         "reason": f.reason,
         "parameters": _parameters(f, channel_names),
+        "published": _published(f, published) if published else None,
         "remarks": _remarks(f, channel_names),
         "agreed": " ".join(filter(None, (_agreed(f), words.planned(f)))),
         "time": _time(f),
@@ -133,6 +134,15 @@ def _parameters(f: Fit, channel_names: tuple[str, ...]) -> View:
         )
     heads = list(channel_names[:count]) if count > 1 else ["value"]
     return {"rows": rows, "wide": wide, "heads": heads, "count": count}
+
+
+def _published(f: Fit, published: Published) -> View:
+    """Errors of this fit and of the published one, under the loss that was fitted and the perceptual one."""
+    losses = list(dict.fromkeys((f.loss, "perceptual")))
+    rows = []
+    for name, errors in (("this fit", f.errors), ("published fit", published.errors)):
+        rows.append({"name": name, "errors": [significant(errors.get(loss, math.nan), 3) for loss in losses]})
+    return {"source": published.source, "losses": losses, "rows": rows}
 
 
 def _range(lower: float, upper: float, open_lower: bool = False, open_upper: bool = False) -> str:

@@ -124,7 +124,10 @@ def _section(number: int, title: str, fits: list[Fit], evidence: Evidence | None
         "albedo": _albedo(evidence, drawn, first, salt),
         "losses": _losses(*zip(*ranked, strict=True)),
         "physics": [physics_view(f, label, evidence, rows) for f, label in ranked if f.parameters],
-        "models": [model_view(f, label, channel_names) for f, label in ranked],
+        "models": [
+            model_view(f, label, channel_names, evidence.published.get(fit_key(f)) if evidence else None)
+            for f, label in ranked
+        ],
         "missing": _missing(evidence, [n for f, n in ranked if f.parameters and not _shows(f, rows)]),
         "overview": {label: (perceptual(f), f.converged) for f, label in zip(fits, names, strict=True)},
     }
@@ -387,6 +390,9 @@ def _references(fits: Sequence[Fit], evidence: Sequence[Evidence]) -> list[View]
         add(("rusinkiewicz1998",), "half and difference angles")
     if any(e.sphere for e in evidence):
         add(("sharma2005", "colour"), "colour differences")
+    for e in evidence:
+        for p in e.published.values():
+            add((p.reference,), f"published fit of {e.material}")
     entries = [{"text": references.REFERENCES.get(k, k), "uses": ", ".join(u)} for k, u in uses.items()]
     return sorted(entries, key=lambda e: str(e["text"]))
 

@@ -1,12 +1,17 @@
-"""What the plots of a report are drawn from."""
+"""What the plots of a report are drawn from, and what its fits are held against."""
 
+from dataclasses import replace
+
+import brdfit
 import numpy as np
+from brdfit.data import source
 from brdfit.reports.evidence import load_evidence, save_evidence
 from brdfit.reports.gather import gather, interpolate
+from brdfit.reports.published_fits import published
 from brdfit.reports.write import write_report
 from brdfit.tables import Scattered, SphericalGrid, table
 
-from .report_cases import WARD, Reader, fit_of, table_of
+from .report_cases import GGX, WARD, Reader, fit_of, table_of
 
 
 def spherical():
@@ -82,3 +87,32 @@ def test_evidence_survives_its_file(tmp_path, evidence):
     assert back.lobes.how == evidence.lobes.how
     assert isinstance(back.sphere.exposure, float)
     np.testing.assert_allclose(back.albedo.fitted, evidence.albedo.fitted, rtol=1e-6)
+
+
+def test_published_fit_beside_the_new_one(tmp_path, measured):
+    """A table that Ngan's Ward lobe of nickel is the truth of: it errs by nothing there, and gtr has no published fit."""
+    layout = measured.layout
+    nickel = table_of(brdfit.preset("ngan_ward", "nickel"), layout, "nickel")
+    fits = [fit_of("ward", WARD, 0.0333, "nickel"), fit_of("gtr", GGX, 0.0456, "nickel")]
+    evidence = gather(nickel, fits)
+    save_evidence(tmp_path, [evidence])
+    (back,) = load_evidence(tmp_path)
+    assert back.published == evidence.published
+    ((key, found),) = evidence.published.items()
+    assert key == evidence.keys[0]
+    assert found.source == source("ngan_ward")
+    assert max(found.errors.values()) < 1e-12
+    text = Reader(write_report(tmp_path, fits, [evidence], {}).read_text()).text
+    assert text.count("beside the published fit") == 1
+    assert "this fit 0.0167 0.0333 published fit" in text
+    assert f"Published fit: {source('ngan_ward')}." in text
+    assert "[published fit of nickel]" in text
+
+
+def test_no_published_fit(measured):
+    """Of another material, or for another number of channels, there is nothing beside the new fit."""
+    fit, nickel = fit_of("ward", WARD, 0.0333), replace(measured, material="nickel")
+    assert published(measured, [fit]) == [None]
+    assert published(replace(nickel, planes=measured.planes[:1]), [fit]) == [None]
+    assert published(nickel, [replace(fit, model=None)]) == [None]
+    assert published(nickel, [fit]) != [None]
