@@ -173,11 +173,13 @@ def from_directions(wi: ArrayLike, wo: ArrayLike) -> Geometry:
 
 def from_sums(total: Array, difference: Array, cos_i: Array, cos_o: Array) -> Geometry:
     """Geometry of l + v and l - v, ``[..., 3]``, and of n.l and n.v, ``[...]``."""
-    total2 = jnp.sum(total * total, -1)
-    difference2 = jnp.sum(difference * difference, -1)
+    # Component by component: XLA hands a sum along an axis to a library of its own and no longer joins what comes before and
+    # after it to one loop, which takes up to five times as long (tests/test_geometry.py::test_one_loop).
+    x2, y2, z2 = (total[..., k] ** 2 for k in range(3))
+    dx2, dy2, dz2 = (difference[..., k] ** 2 for k in range(3))
+    total2, difference2 = x2 + y2 + z2, dx2 + dy2 + dz2
     # |l + v|^2 + |l - v|^2 is 4 for unit vectors; dividing by it keeps theta_d right for vectors normalised to rounding.
     square = total2 + difference2
-    x2, y2, z2 = (total[..., k] ** 2 for k in range(3))
     # The derivative of z/|l + v| cancels where x^2 + y^2 is small, that of (x^2 + y^2)/|l + v|^2 where z is, and between two
     # directions that graze |l + v| may be 1e-4 (tests/test_stability.py::test_single_precision).
     high = x2 + y2 < z2

@@ -4,6 +4,7 @@ The oracle starts from the definitions, h = (l + v)/|l + v| and 2 theta_d = the 
 value of every float it is given. What remains is the rounding of our own operations.
 """
 
+import brdfit
 import jax
 import jax.numpy as jnp
 import mpmath as mp
@@ -216,3 +217,12 @@ def test_isotropic_geometry_has_no_azimuth():
     with pytest.raises(ValueError, match="an anisotropic model needs the azimuth of the half vector, and this table is iso"):
         isotropic.tangential()
     assert isotropic.flat().h_x2 is None
+
+
+def test_one_loop():
+    """Sums over components that the compiler hands to a library break the loop of a model: kCustom in its program."""
+    model = brdfit.compose("diffraction", "retro")(scatter=0.1, b=100.0, c=1.0, retro=0.1, alpha_retro=0.2)
+    wi, wo = jnp.full((8192, 3), 3**-0.5), jnp.full((8192, 3), 3**-0.5)
+    program = jax.jit(lambda m, i, o: m(i, o)).lower(model, wi, wo).compile()
+    assert "kind=kLoop" in program.as_text()
+    assert "kind=kCustom" not in program.as_text()
