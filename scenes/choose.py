@@ -3,11 +3,13 @@
 from __future__ import annotations
 
 import os
-from collections.abc import Iterable, Sequence
+from collections.abc import Callable, Iterable, Sequence
 from concurrent.futures import ThreadPoolExecutor
 from dataclasses import dataclass
 from functools import cached_property
 from typing import Protocol
+
+import numpy as np
 
 from ..models import BRDF
 from ..models.effects import EFFECTS, compose
@@ -18,6 +20,8 @@ Effects = frozenset[str]
 
 STALLED = 0.02
 """Relative decrease of the error of a fit below which one more effect does not count as progress."""
+ALIKE = 0.05
+"""Relative difference of times that is not told from none: the model with fewer operations then counts as cheaper."""
 NEARLY = 0.01
 """Relative difference of image errors within which, where no set meets the tolerance, the cheaper one is better."""
 
@@ -31,8 +35,8 @@ class Bench(Protocol):
     def error(self, tried: Tried) -> float:
         """Error of its picture."""
 
-    def cost(self, tried: Tried) -> tuple[float, Operations]:
-        """Nanoseconds and operations for one pair of directions and all channels, in float32."""
+    def costs(self, several: Sequence[Tried]) -> list[tuple[float, Operations]]:
+        """Nanoseconds and operations for one pair of directions and all channels, in float32, timed in turns."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -58,7 +62,7 @@ class Tried:
     @cached_property
     def costs(self) -> tuple[float, Operations]:
         """Nanoseconds and operations."""
-        return self.bench.cost(self)
+        return self.bench.costs([self])[0]
 
     @property
     def nanoseconds(self) -> float:
@@ -129,9 +133,10 @@ def larger(effects: Effects, among: Iterable[str]) -> list[Effects]:
 def choose(bench: Bench, tolerance: Tolerance, budget: float | None, among: Sequence[str]) -> Choice:
     """Search forward until the tolerance is met, then backward for what can be left out.
 
-    Forward, the effect whose addition lowers the error of the fit most is added. Where that stalls, everything is tried.
-    Backward, the effect is dropped whose loss leaves the cheapest model that still meets the tolerance. Of all sets met on
-    the way that do, the cheapest is chosen, and one that is within the budget if there is one.
+    Forward, the effect whose addition lowers the error of the fit most is added; one that lowered its square by less before
+    than another does now is not fitted again. Where that stalls, everything is tried. Backward, the effect is dropped whose
+    loss leaves the cheapest model that still meets the tolerance. Of all sets met on the way that do, the cheapest is
+    chosen, and one that is within the budget, nanoseconds for one pair of directions, if there is one.
     """
     known: dict[Effects, Tried] = {}
 
@@ -150,12 +155,12 @@ def choose(bench: Bench, tolerance: Tolerance, budget: float | None, among: Sequ
 
     singles = [s for n in among if possible(s := frozenset([n]))]
     here = min(explore(singles), key=lambda t: t.fit_error)
+    gains: dict[str, float] = {}
     for _ in among:
         if tolerance.met(here.error):
             break
-        wider = explore(larger(frozenset(here.effects), among), here.model)
-        best = min(wider, key=lambda t: t.fit_error, default=here)
-        if best.fit_error > (1 - STALLED) * here.fit_error or best is here:
+        best = _step(here, among, gains, explore)
+        if best.fit_error > (1 - STALLED) * here.fit_error:
             break
         here = best
     everything = explore([frozenset(among)], here.model, pictures=True)[0]
@@ -166,20 +171,22 @@ def choose(bench: Bench, tolerance: Tolerance, budget: float | None, among: Sequ
         good = [t for t in less if tolerance.met(t.error)]
         if not good:
             break
-        here = min(good, key=_cost)
+        here = _cheapest(good)
     seen = [t for t in known.values() if "error" in vars(t)]
     good = [t for t in seen if tolerance.met(t.error)]
-    fine = [t for t in good if budget is None or t.nanoseconds <= budget]
     if good:
-        chosen = min(fine or good, key=_cost)
+        _time(good)
+        fine = [t for t in good if budget is None or t.nanoseconds <= budget]
+        chosen = _cheapest(fine or good)
     else:
         sign = -1 if tolerance.measure == "psnr" else 1
         least = min(sign * t.error for t in seen)
-        chosen = min((t for t in seen if sign * t.error <= least + NEARLY * abs(least)), key=_cost)
+        chosen = _cheapest([t for t in seen if sign * t.error <= least + NEARLY * abs(least)])
     here_set = frozenset(chosen.effects)
     explore([*smaller(here_set), *larger(here_set, among)], chosen.model, pictures=True)
     ladder = _ladder(chosen, known)
     explore([frozenset(t.effects) for t in (*ladder, everything)], pictures=True)
+    _time([t for t in known.values() if "error" in vars(t)])
     return Choice(
         chosen,
         bool(good),
@@ -191,9 +198,33 @@ def choose(bench: Bench, tolerance: Tolerance, budget: float | None, among: Sequ
     )
 
 
-def _cost(t: Tried) -> tuple[float, float]:
-    """Compiler's count of operations, which no busy moment changes, then the number of effects."""
-    return t.operations.flops + t.operations.transcendentals, len(t.effects)
+def _step(here: Tried, among: Iterable[str], gains: dict[str, float], explore: Callable[..., list[Tried]]) -> Tried:
+    """The best set with one effect more, or the given one; what each effect gained is kept in ``gains``."""
+    best, at_once = here, os.cpu_count() or 1
+    wider = {n: s for n in among for s in larger(frozenset(here.effects), [n])}
+    order = sorted(wider, key=lambda n: -gains.get(n, np.inf))
+    for k in range(0, len(order), at_once):
+        names = order[k : k + at_once]
+        # an effect seldom gains more beside others than without them
+        names = [n for n in names if gains.get(n, np.inf) > here.fit_error**2 - best.fit_error**2]
+        for n, t in zip(names, explore([wider[n] for n in names], here.model), strict=True):
+            gains[n] = here.fit_error**2 - t.fit_error**2
+            best = min(best, t, key=lambda t: t.fit_error)
+    return best
+
+
+def _time(several: Sequence[Tried]) -> None:
+    """Find the costs of several models together, so that they can be compared."""
+    for t, costs in zip(several, several[0].bench.costs(several), strict=True):
+        vars(t)["costs"] = costs
+
+
+def _cheapest(several: Sequence[Tried]) -> Tried:
+    """The model that takes the least time; of those that are :data:`ALIKE`, that with the fewest operations."""
+    _time(several)
+    least = min(t.nanoseconds for t in several)
+    alike = [t for t in several if t.nanoseconds <= (1 + ALIKE) * least]
+    return min(alike, key=lambda t: (t.operations.flops + t.operations.transcendentals, len(t.effects)))
 
 
 def _verdict(name: str, chosen: Tried, known: dict[Effects, Tried]) -> Verdict:

@@ -22,6 +22,11 @@ from .scene import MEASURES
 from .survey import Study
 
 PAGE, NUMBERS, PICTURES = "scene.html", "scene.json", "scene.exr"
+WHY_LEFT_OUT = {
+    "interreflection": "its fit would take longer than all the rest of the search",
+    "dispersion": "its fit would take longer than all the rest of the search",
+    "anisotropy": "the table is isotropic",
+}
 TOP = 10.0
 """ΔE ITP of the darkest colour of the difference maps."""
 
@@ -73,6 +78,8 @@ def document(study: Study, where: dict[str, Any]) -> dict[str, Any]:
         "pixels": len(study.view.wo),
         "met": choice.met,
         "affordable": choice.affordable,
+        "directions_a_pixel": study.lights,
+        "left_out": list(study.left_out),
         "summary": summary(study),
         "chosen": _record(study, choice.chosen, "chosen"),
         "everything": _record(study, choice.everything, "everything"),
@@ -130,7 +137,8 @@ def summary(study: Study) -> str:
         f"{significant(choice.everything.error)})."
     )
     if not choice.affordable and study.scene.budget is not None:
-        said += f" That is more than the budget of {study.scene.budget:g} ns."
+        pixel = significant(study.lights * choice.chosen.nanoseconds, 2)
+        said += f" With {study.lights} such a pixel, {pixel} ns, that is more than the budget of {study.scene.budget:g} ns."
     return said
 
 
@@ -229,6 +237,7 @@ def _context(study: Study, where: dict[str, Any]) -> dict[str, Any]:
         + [_row(choice.everything, None)],
         "called": [_said(study, v) for v in choice.verdicts if v.called],
         "not_called": [_said(study, v) for v in choice.verdicts if not v.called],
+        "left_out": [f"{_plain(n)} ({WHY_LEFT_OUT[n]})" for n in study.left_out],
         "map": scene_map(cells, study.grid, "Where in theta_h and theta_d the picture comes from"),
         "angles": _angles(study),
         "filled": percent(study.filled) if study.filled > 5e-4 else "",

@@ -208,8 +208,9 @@ class _Linearised:
 def _linearise(data: Shown, x: Array, chart: Chart) -> Array:
     def residual(x: Array) -> tuple[Array, Array]:
         own, shared = chart.split(x, data.scale.shape[1])
-        models = [chart.model(list(o), list(shared)) for o in own]
-        f = jnp.stack([jnp.broadcast_to(m.evaluate(data.geometry), data.geometry.shape) for m in models], -1)
+        f = jax.vmap(
+            lambda o: jnp.broadcast_to(chart.model(o, shared).evaluate(data.geometry), data.geometry.shape), out_axes=-1
+        )(own)
         r = data.residual(f).ravel()
         return r, r
 

@@ -3,8 +3,8 @@
 from __future__ import annotations
 
 import time
+from collections.abc import Sequence
 from dataclasses import dataclass
-from threading import Lock
 
 import numpy as np
 
@@ -31,7 +31,7 @@ FITTED_ANGLE = np.radians(80)
 DEAR = frozenset({"interreflection", "dispersion"})
 """Effects that a search leaves out: beside others their fits take longer than all the rest of it."""
 TIMED = 8192
-REPEATS, BUDGET = 9, 3.0
+REPEATS, BUDGET = 9, 1.5
 
 
 @dataclass(frozen=True, eq=False)
@@ -41,6 +41,10 @@ class Study(Look):
     choice: Choice
     pictures: dict[str, Rendered]
     """``table``, ``chosen`` and ``everything``."""
+    left_out: tuple[str, ...]
+    """Effects that were not tried."""
+    lights: int
+    """Directions of light without extent for each pixel, by which its time is counted; at least 1."""
     seconds: float
 
 
@@ -58,15 +62,18 @@ def study(table: Table, scene: Scene, progress: Progress | None = None) -> Study
     summary = summarise(table, used if used.any() else table.mask)
     bench = _Bench(here, shown(here), summary)
     progress.say("searching")
-    among = [n for n in EFFECTS if n not in DEAR and (n != "anisotropy" or not table.isotropic)]
-    choice = choose(bench, scene.tolerance, scene.budget, among)
+    left_out = [n for n in EFFECTS if n in DEAR or (n == "anisotropy" and table.isotropic)]
+    lights = max(len(here.light.punctual), 1)
+    budget = None if scene.budget is None else scene.budget / lights
+    choice = choose(bench, scene.tolerance, budget, [n for n in EFFECTS if n not in left_out])
     progress.advance(f"{choice.chosen.label}: {MEASURES[scene.tolerance.measure][1]} {choice.chosen.error:.3g}")
     both = {"chosen": choice.chosen, "everything": choice.everything}
-    bench.time([t for t in choice.tried if "error" in vars(t)])
     progress.advance(f"{len(choice.tried)} sets of effects fitted")
     return Study(
         **vars(here),
         choice=choice,
+        left_out=tuple(left_out),
+        lights=lights,
         pictures={"table": here.reference} | {k: bench.pictures[t.effects] for k, t in both.items()},
         seconds=time.perf_counter() - begin,
     )
@@ -81,7 +88,6 @@ class _Bench:
         self.sample = Sample(few.wi, few.wo, few.measured, 90.0)
         self.pictures: dict[tuple[str, ...], Rendered] = {}
         self.evaluations: dict[tuple[str, ...], Evaluation] = {}
-        self.timing = Lock()
 
     def fit(self, effects: Effects, near: BRDF | None) -> tuple[BRDF, float]:
         quick = quick_fit(compose(*effects), self.data, self.summary, near)
@@ -94,21 +100,10 @@ class _Bench:
         measure = here.scene.tolerance.measure
         return difference(measure, picture.values, here.reference.values, here.exposure, here.view)
 
-    def cost(self, tried: Tried) -> tuple[float, Operations]:
-        evaluation = self.evaluation(tried)
-        with self.timing:
-            took = interleaved({0: evaluation}, 3, 0.1)[0].per(TIMED).low
-        return 1e9 * took, evaluation.operations()
-
-    def time(self, several: list[Tried]) -> None:
-        """Time models in turns, so that they can be compared: what :meth:`cost` found under load is replaced.
-
-        The lower quartile counts, as other programs only ever add.
-        """
+    def costs(self, several: Sequence[Tried]) -> list[tuple[float, Operations]]:
         evaluations = {t.effects: self.evaluation(t) for t in several}
         took = interleaved(evaluations, REPEATS, BUDGET)
-        for t in several:
-            vars(t)["costs"] = 1e9 * took[t.effects].per(TIMED).low, evaluations[t.effects].operations()
+        return [(1e9 * took[t.effects].per(TIMED).median, evaluations[t.effects].operations()) for t in several]
 
     def evaluation(self, tried: Tried) -> Evaluation:
         if tried.effects not in self.evaluations:

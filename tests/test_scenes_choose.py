@@ -43,9 +43,9 @@ class Known:
     def error(self, tried):
         return self.of(tried.effects)
 
-    def cost(self, tried):
-        work = sum(PRICE[n] for n in tried.effects)
-        return work / 10, Operations(work, 0, 0)
+    def costs(self, several):
+        work = [sum(PRICE[n] for n in t.effects) for t in several]
+        return [(w / 10, Operations(w, 0, 0)) for w in work]
 
 
 @pytest.mark.parametrize(
