@@ -50,13 +50,21 @@ class MissingEnergy(eqx.Module):
     @staticmethod
     def of(facets: Any) -> MissingEnergy:
         """Of a GTR or GGX lobe."""
+        dtype = jnp.result_type(facets.alpha)
+        # Guard: powers of a width near the smallest number underflow, and 0/0 = NaN. In float32 lobes narrower than 1e-4
+        # (half-widths are alpha/sqrt(gamma)) are compensated as if that wide (tests/test_effects.py::test_narrow_lobes).
+        least = float(np.finfo(np.dtype(dtype)).tiny) ** 0.1055
+        if isinstance(facets, ndf.GTR):
+            facets = ndf.GTR(jnp.maximum(facets.alpha, least * jnp.sqrt(jnp.maximum(facets.gamma, 1))), facets.gamma)
+        else:
+            facets = ndf.GGX(jnp.maximum(facets.alpha, least))
         lobe = facets if isinstance(facets, ndf.GTR) else _GGX(facets.alpha)
-        dtype = jnp.result_type(lobe.alpha)
         nodes, matrix = _interpolation()
         a = jnp.minimum(1, 2 * averted_area(facets, jnp.asarray(1e-4, dtype)))
         psi = (1 - nodes**2) * (np.pi / 2)
         sin_psi, cos_psi = (jnp.asarray(f(psi), dtype) for f in (np.sin, np.cos))
-        missing = _missing(facets, lobe, a * cos_psi / jnp.sqrt(sin_psi**2 + a**2 * cos_psi**2))
+        norm = jnp.sqrt(sin_psi**2 + a**2 * cos_psi**2)
+        missing = _missing(facets, lobe, a * cos_psi / norm, sin_psi / norm)
         return MissingEnergy(jnp.asarray(matrix, dtype) @ (missing / (sin_psi**2 + a**2)), a)
 
     def __call__(self, cosine: Float[Array, "..."]) -> Float[Array, "..."]:
@@ -91,23 +99,27 @@ class _GGX(ndf.GGX):
         return sin2 / (sin2 + rest), rest / (sin2 + rest)
 
 
-def _missing(facets: Any, lobe: ndf.GTR | _GGX, cosine: Float[Array, " n"]) -> Float[Array, " n"]:
+def _missing(facets: Any, lobe: ndf.GTR | _GGX, cosine: Float[Array, " n"], sine: Float[Array, " n"]) -> Float[Array, " n"]:
+    """1 - E at cosines and sines of theta."""
     dtype = cosine.dtype
     x, wx = (jnp.asarray(a, dtype) for a in gauss_legendre(FACETS))
     y, wy = gauss_legendre(AZIMUTHS)
     offset = np.pi / 2 * y**2  # nodes crowd where, for grazing light, the range ends abruptly
     cos_phi = jnp.asarray(np.cos(np.r_[np.pi / 2 - offset, np.pi / 2 + offset]), dtype)[:, None]
     around = jnp.asarray(np.r_[y * wy, y * wy], dtype)
-    c = cosine[:, None, None]
-    s = jnp.sqrt((1 - c) * (1 + c))
+    c, s = cosine[:, None, None], sine[:, None, None]
     end = jnp.arctan2(c, -s * cos_phi) / 2  # half of pi/2 + delta, tan(delta) = tan(theta) cos(phi)
     share, rest = lobe.cumulative(jnp.sin(end) ** 2, jnp.cos(end) ** 2)
     far = (1 - x) ** 3  # and towards the end of the range, where the lobe's tail is
     sin2, cos2 = lobe.quantile(share * (1 - far), rest + share * far)
-    sin_m, cos_m = jnp.sqrt(sin2), jnp.sqrt(cos2)
+    # Guard: 0/0 at the end of the range, and shares that rounding takes below 0 (tests/test_effects.py::test_narrow_lobes).
+    tiny = float(np.finfo(np.dtype(dtype)).tiny)
+    sin_m, cos_m = jnp.sqrt(jnp.maximum(sin2, tiny)), jnp.sqrt(jnp.maximum(cos2, tiny))
     facing = s * sin_m * cos_phi + c * cos_m
     out = jnp.maximum(2 * facing * cos_m - c, 0)  # at the end of the range it is 0 to rounding
-    light, viewer = averted_area(facets, jnp.minimum(out, 1)), averted_area(facets, c)
+    # Guard: 0/0 on the horizon, where nothing is seen (tests/test_effects.py::test_narrow_lobes).
+    above = jnp.clip(out, 1e-4, 1)
+    light, viewer = averted_area(facets, above), averted_area(facets, c)
     # Guard: two quotients, because the derivative of one squares its divisor, 1e-22 here, beyond float32
     # (tests/test_effects.py::test_finite_at_corners).
     seen = out / (c * (out + light) + out * viewer) * (facing / cos_m)

@@ -79,11 +79,12 @@ class Shown(eqx.Module):
         n = len(self.scale)
         r = self.root_weight[:, None] * (pq(jnp.maximum(f[:n] * self.scale, 0)) - self.signal)
         if self.ambient is None:
-            return r
+            return jnp.asarray(r)
         a = self.ambient
         albedo = (a.weight[..., None] * f[n:].reshape(*a.weight.shape, -1)).sum(1)
         values = pq(jnp.maximum(a.rest + albedo * a.scale, 0))
-        return jnp.concatenate([r, a.root_weight[:, None] * (values - a.signal)])
+        rows: Array = jnp.concatenate([r, a.root_weight[:, None] * (values - a.signal)])
+        return rows
 
 
 @dataclass(frozen=True, eq=False)
