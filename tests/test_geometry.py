@@ -221,7 +221,8 @@ def test_isotropic_geometry_has_no_azimuth():
 
 def test_one_loop():
     """Sums over components that the compiler hands to a library break the loop of a model: kCustom in its program."""
-    model = brdfit.compose("diffraction", "retro")(scatter=0.1, b=100.0, c=1.0, retro=0.1, alpha_retro=0.2)
+    numbers = {"scatter": 0.1, "b": 100.0, "c": 1.0, "retro": 0.1, "alpha_retro": 0.2}
+    model = brdfit.model("diffraction+retro", **numbers)
     wi, wo = jnp.full((8192, 3), 3**-0.5), jnp.full((8192, 3), 3**-0.5)
     program = jax.jit(lambda m, i, o: m(i, o)).lower(model, wi, wo).compile()
     assert "kind=kLoop" in program.as_text()
