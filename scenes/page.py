@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import json
 from pathlib import Path
 from typing import Any
 
@@ -10,9 +9,10 @@ import numpy as np
 
 from ..angles import half_difference
 from ..environment import environment
-from ..files import StrPath, replacing
+from ..files import StrPath
 from ..models import parameter_values
 from ..models.effects import EFFECTS
+from ..reports.beside import write_beside
 from ..reports.words import listed, minus, percent, seconds, significant, thousands
 from .choose import Tried, Verdict
 from .difference import delta_itp, difference
@@ -36,28 +36,14 @@ def write_scene(out_dir: StrPath, study: Study, exr: bool = False) -> Path:
 
     Raises InputError if a file cannot be written.
     """
-    from jinja2 import Environment, FileSystemLoader, StrictUndefined
-
     where = environment()
-    here = Path(__file__).parent
-    templates = Environment(
-        loader=FileSystemLoader([here, here.parent / "reports"]),
-        autoescape=True,
-        undefined=StrictUndefined,
-        trim_blocks=True,
-        lstrip_blocks=True,
-    )
-    html = templates.get_template("scene.html.j2").render(_context(study, where))
-    numbers = json.dumps(document(study, where), indent=1, ensure_ascii=False, allow_nan=False) + "\n"
-    out = Path(out_dir)
-    for name, text in ((NUMBERS, numbers), (PAGE, html)):
-        with replacing(out / name) as temporary:
-            temporary.write_text(text, encoding="utf-8")
+    template = Path(__file__).parent / "scene.html.j2"
+    page = write_beside(out_dir, template, _context(study, where), (PAGE, NUMBERS), document(study, where))
     if exr:
         layers = {k: study.view.picture(p.values) for k, p in study.pictures.items()}
         layers = {k: v if v.shape[-1] == 3 else np.repeat(v.mean(-1, keepdims=True), 3, -1) for k, v in layers.items()}
-        write_exr(out / PICTURES, layers)
-    return out / PAGE
+        write_exr(page.parent / PICTURES, layers)
+    return page
 
 
 def document(study: Study, where: dict[str, Any]) -> dict[str, Any]:

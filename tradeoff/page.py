@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import json
 from collections.abc import Sequence
 from dataclasses import asdict, replace
 from pathlib import Path
@@ -11,7 +10,8 @@ from typing import Any
 import numpy as np
 
 from ..environment import environment
-from ..files import StrPath, replacing
+from ..files import StrPath
+from ..reports.beside import write_beside
 from ..reports.words import NONE, significant, thousands
 from ..reports.words import seconds as duration
 from .approximations import Approximation
@@ -33,24 +33,9 @@ SHORT = {"Smith, height-correlated": "correlated", "Smith, separable": "separabl
 
 def write_tradeoff(out_dir: StrPath, result: Tradeoff) -> Path:
     """Write DIR/tradeoff.json and DIR/tradeoff.html, each replaced whole; returns the path of the page."""
-    from jinja2 import Environment, FileSystemLoader, StrictUndefined
-
     where = environment()
-    here = Path(__file__).parent
-    templates = Environment(
-        loader=FileSystemLoader([here, here.parent / "reports"]),
-        autoescape=True,
-        undefined=StrictUndefined,
-        trim_blocks=True,
-        lstrip_blocks=True,
-    )
-    html = templates.get_template("tradeoff.html.j2").render(_context(result, where))
-    numbers = json.dumps(document(result, where), indent=1, ensure_ascii=False, allow_nan=False) + "\n"
-    out = Path(out_dir)
-    for name, text in ((NUMBERS, numbers), (PAGE, html)):
-        with replacing(out / name) as temporary:
-            temporary.write_text(text, encoding="utf-8")
-    return out / PAGE
+    template = Path(__file__).parent / "tradeoff.html.j2"
+    return write_beside(out_dir, template, _context(result, where), (PAGE, NUMBERS), document(result, where))
 
 
 def document(result: Tradeoff, where: dict[str, Any]) -> dict[str, Any]:
