@@ -161,12 +161,12 @@ def fit(
     cls = model_class(model, (not table.isotropic) if anisotropic is None else anisotropic)
     cells = int(prepare(table, max_angle, measure, options["loss"]).used.sum())
     chosen = plan(_name(cls), cells, tolerance, time_budget)
-    seconds = 0.0
+    spent = {"compile": 0.0, "solve": 0.0}
     while True:
         found = _fit(table, model, effort=RUNGS[chosen.rung], **options)
-        seconds += found.seconds["solve"]
+        spent = {piece: t + found.seconds[piece] for piece, t in spent.items()}
         if tolerance is None or not found.gain > tolerance / 2 or chosen.rung == len(RUNGS) - 1:
-            return replace(found, plan=chosen, seconds={**found.seconds, "solve": seconds})
+            return replace(found, plan=chosen, seconds={**found.seconds, **spent})
         chosen = plan(_name(cls), cells, tolerance, time_budget, lowest=chosen.rung + 1)
 
 
@@ -249,7 +249,7 @@ def _fit(
         passes=max(f.passes for f in found),
         path="exact" if any(f.exact for f in found) else "compressed",
         shift=float(judged.shift.max(initial=0.0)),
-        gain=judged.gain,
+        gain=0.0 if all(_exact(f.minimum) for f in found) else judged.gain,
         effort=effort,
     )
 
@@ -407,11 +407,16 @@ def _verdict(found: list[Found], rtol: float) -> tuple[bool, str]:
     return min((_ending(f.minimum, rtol) for f in sorted(found, key=lambda f: -float(f.minimum.cost))), key=lambda v: v[0])
 
 
+def _exact(end: Minimum) -> bool:
+    """Whether the error is rounding, of which nothing can be gained."""
+    return float(np.sqrt(end.cost)) <= max(EXACT * float(end.scale), BLACK)
+
+
 def _ending(end: Minimum, rtol: float) -> tuple[bool, str]:
     error, cosine, steps = float(np.sqrt(end.cost)), float(end.optimality), int(end.steps)
     if not np.isfinite(error) or error > 1e140:
         return False, "no start gave a finite error: the model is not defined where the data are"
-    if error <= max(EXACT * float(end.scale), BLACK):
+    if _exact(end):
         return True, f"exact fit: the error is {error:.1g}, which is rounding"
     if not bool(end.stopped):
         return False, f"stopped at the limit of {steps} steps; the gradient is still {cosine:.1g} (cosine to the residual)"
