@@ -149,15 +149,13 @@ def _composed_chart(cls: type[Composition], narrow: bool = True) -> Chart:
     """Of a composition of effects: those of its tail and its trade-off, where it has them."""
     chart = plain_chart(cls)
     # A refit of the colours settles these too, though the BRDF is affine in them only while others are held.
-    coordinates = tuple(
-        replace(c, linear=c.linear or c.name in ("scatter", "specular", "specular_2")) for c in chart.coordinates
-    )
+    coordinates = tuple(replace(c, linear=c.linear or c.name in ("scatter", "specular", "share")) for c in chart.coordinates)
     chart = replace(chart, coordinates=coordinates)
     if {"alpha", "gamma"} <= {c.name for c in coordinates}:
         chart = _with_tail(chart, narrow)
     if "second_lobe" in cls.effects and not {"tail", "anisotropy", "dispersion"} & set(cls.effects):
         chart = _with_order(chart)
-    return _with_trade_off(chart, "second_lobe" in cls.effects) if "trade_off" in cls.effects else chart
+    return _with_trade_off(chart) if "trade_off" in cls.effects else chart
 
 
 def _with_order(chart: Chart) -> Chart:
@@ -200,18 +198,15 @@ def _with_tail(chart: Chart, narrow: bool) -> Chart:
     return tailed if tailed.own_lobes else replace(tailed, end=flat)
 
 
-def _with_trade_off(chart: Chart, second: bool) -> Chart:
-    """Diffuse times what the lobes leave of it in place of diffuse, which is not determined as they leave nothing."""
-
-    def left(p: Scalars) -> Array:
-        return (1 - p["specular"]) * (1 - p["specular_2"]) if second else 1 - p["specular"]
+def _with_trade_off(chart: Chart) -> Chart:
+    """Diffuse times what the surface leaves of it in place of diffuse, which is not determined as it leaves nothing."""
 
     def to_parameters(x: Scalars) -> Scalars:
         p = chart.to_parameters(x)
-        return {**p, "diffuse": p["diffuse"] / left(p)}
+        return {**p, "diffuse": p["diffuse"] / (1 - p["specular"])}
 
     def from_parameters(p: Scalars) -> Scalars:
-        return chart.from_parameters({**p, "diffuse": p["diffuse"] * left(p)})
+        return chart.from_parameters({**p, "diffuse": p["diffuse"] * (1 - p["specular"])})
 
     return _rewritten(chart, to_parameters, from_parameters)
 
@@ -282,5 +277,5 @@ def charts(cls: type[BRDF], plain: bool = False, bounds: tuple[tuple[str, float,
         if cls is SGD:
             return (_sgd_chart(),)
         if cls in (AshikhminShirley, AshikhminShirleyAnisotropic):
-            return (_with_trade_off(plain_chart(cls), second=False),)
+            return (_with_trade_off(plain_chart(cls)),)
     return (plain_chart(cls, bounds),)

@@ -25,6 +25,22 @@ def implicit(lobe: Any, g: Geometry) -> Any:
     return 0.25
 
 
+Switch = Callable[[Any], Field]
+"""How much of something there is, of the parameters: 0 none, 1 all of it."""
+
+
+def mixed(switch: Switch | None, without: Term, with_it: Term) -> Term:
+    """The second of two terms; with a switch the mean of both that it asks for."""
+    if switch is None:
+        return with_it
+
+    def term(m: Any, g: Geometry) -> Field:
+        share = switch(m)
+        return (1 - share) * without(m, g) + share * with_it(m, g)
+
+    return term
+
+
 def _lambert(albedo: Field, m: Any, g: Geometry) -> Field:
     return lambert(albedo)
 
@@ -43,6 +59,8 @@ class Lobe:
     """Their distribution, of the parameters."""
     reflectance: Term
     """F of one facet, with its scale."""
+    share: Switch | None = None
+    """Its share in the surface term; None for all of it."""
 
 
 @dataclass(frozen=True)
@@ -56,6 +74,8 @@ class Parts:
     lobes: tuple[Lobe, ...] = ()
     visibility: Callable[[Any, Geometry], Any] = implicit
     """V = G / (4 n.l n.v) of a distribution."""
+    masked: Switch | None = None
+    """How much of that stands in place of :func:`implicit`; None for all of it."""
     terms: tuple[Term, ...] = ()
     """Whatever else is added, 1/sr."""
 
@@ -64,7 +84,11 @@ class Parts:
         values = [] if self.albedo is None else [self.body(self.albedo(m, g), m, g)]
         for lobe in self.lobes:
             facets = lobe.facets(m)
-            values.append(microfacet(density(facets, g), lobe.reflectance(m, g), self.visibility(facets, g)))
+            visibility = self.visibility(facets, g)
+            if self.masked is not None:
+                visibility = (1 - self.masked(m)) * implicit(facets, g) + self.masked(m) * visibility
+            value = microfacet(density(facets, g), lobe.reflectance(m, g), visibility)
+            values.append(value if lobe.share is None else lobe.share(m) * value)
         values += [term(m, g) for term in self.terms]
         total = values[0]
         for value in values[1:]:
@@ -84,4 +108,4 @@ class Composition(BRDF):
         return self.parts.evaluate(self, g)
 
 
-__all__ = ["Composition", "Lobe", "Parts", "density", "implicit"]
+__all__ = ["Composition", "Lobe", "Parts", "Switch", "Term", "density", "implicit", "mixed"]

@@ -97,10 +97,8 @@ TERMS: dict[str, Callable[[View, dict[str, Any]], Any]] = {
     "lobe+fresnel": lambda q, p: schlick(p["specular"], q.cos_d) * ggx(q.h, p["alpha"], p["alpha"]) / 4,
     "lobe+masking": lambda q, p: p["specular"] * masked(q, p, p["alpha"], p["alpha"]),
     "lobe+second_lobe+fresnel": lambda q, p: (
-        (
-            schlick(p["specular"], q.cos_d) * ggx(q.h, p["alpha"], p["alpha"])
-            + schlick(p["specular_2"], q.cos_d) * ggx(q.h, p["alpha_2"], p["alpha_2"])
-        )
+        ((1 - p["share"]) * ggx(q.h, p["alpha"], p["alpha"]) + p["share"] * ggx(q.h, p["alpha_2"], p["alpha_2"]))
+        * schlick(p["specular"], q.cos_d)
         / 4
     ),
     "lobe+anisotropy": lambda q, p: p["specular"] * ggx(q.h, p["alpha_x"], p["alpha_y"]) / 4,
@@ -121,7 +119,7 @@ RANGES = {
     "diffuse": (0, 1),
     "sigma": (0, 1.5),
     "specular": (0, 1),
-    "specular_2": (0, 1),
+    "share": (0, 1),
     "retro": (0, 1),
     "scatter": (0, 5),
     "gamma": (0.5, 6),

@@ -22,6 +22,7 @@ from brdfit.models.gtr import GTR
 from brdfit.models.interreflection import compensation
 from brdfit.references import REFERENCES
 from brdfit.reports.physics import hemisphere
+from brdfit.scenes.choose import without
 from brdfit.stability.domain import unit
 
 from .cases import WI, WO
@@ -38,7 +39,7 @@ TRUTH: dict[str, Any] = {
     "alpha_x": 0.1,
     "alpha_y": 0.3,
     "gamma": 1.6,
-    "specular_2": [0.05, 0.1, 0.15],
+    "share": [0.1, 0.25, 0.4],
     "alpha_2": 0.5,
     "retro": [0.02, 0.03, 0.04],
     "alpha_retro": 0.2,
@@ -167,9 +168,44 @@ def test_a_new_effect_changes_nothing_for_others(monkeypatch: pytest.MonkeyPatch
             return out
 
         before = programs()
-        glow = effect.Effect("glow", "a glow", "1", {}, lambda parts, names: parts)
+        glow = effect.Effect("glow", "a glow", "1", {}, lambda parts, names: parts, effect.at())
         monkeypatch.setattr("brdfit.models.effects.EFFECTS", {"glow": glow, **EFFECTS})
         assert programs() == before
+
+
+# Nesting --------------------------------------------------------------------------------------------------------------
+
+REPLACING = {"fresnel", "masking", "interreflection"}
+"""Effects that put another term in place of one: no value of a parameter takes that back."""
+
+
+@pytest.mark.parametrize("name", EFFECTS)
+def test_a_model_with_an_effect_contains_the_one_without(name: str):
+    """Equal values where the effect's parameters are neutral; to the rounding of a lobe written in another form."""
+    beside = {"body", "lobe", "second_lobe", "retro"}
+    full = frozenset({*beside, *EFFECTS[name].needs, name} if name != "fresnel" else {*beside, name})
+    bare = without(full, name)
+    numbers = truth_of("+".join(in_order(bare)))
+    embedded = EFFECTS[name].neutral({k: np.asarray(v) for k, v in numbers.items()}, bare)
+    if name in REPLACING:
+        assert embedded is None
+        return
+    assert embedded is not None
+    declared = {p.name: p.default for p in parameters_of(variants("+".join(in_order(full)))[0])}
+    with jax.enable_x64(True):
+        small, large = (
+            build(variants("+".join(in_order(names)))[0], values)(WI, WO)
+            for names, values in ((bare, numbers), (full, {k: embedded.get(k, v) for k, v in declared.items()}))
+        )
+    np.testing.assert_allclose(large, small, rtol=1e-9 if name == "tail" else 1e-13, atol=1e-300)
+
+
+def test_effects_that_replace_a_term_beside_fresnel():
+    """F0 = 0 still rises towards grazing, and the body is not only scaled by what the surface leaves."""
+    numbers = {"specular": np.array([0.1]), "diffuse": np.array([0.2])}
+    for name in ("lobe", "trade_off"):
+        assert EFFECTS[name].neutral(numbers, frozenset({"body", "diffraction", "fresnel"})) is None
+    assert EFFECTS["trade_off"].neutral(numbers | {"specular": np.ones(1)}, frozenset({"body", "lobe"})) is None
 
 
 # Names ----------------------------------------------------------------------------------------------------------------
@@ -250,7 +286,7 @@ CORNERS = (
     "diffraction+fresnel",
 )
 ENDS: dict[str, tuple[float, ...]] = {
-    **dict.fromkeys(("diffuse", "specular", "specular_2", "retro", "scatter"), (0.0, 1.0)),
+    **dict.fromkeys(("diffuse", "specular", "share", "retro", "scatter"), (0.0, 1.0)),
     **dict.fromkeys(("alpha", "alpha_2", "alpha_x", "alpha_y", "alpha_retro"), (1e-4, 1.0, 10.0)),
     "gamma": (0.5, 1.0, 2.0),
     "sigma": (0.0, 1.5),

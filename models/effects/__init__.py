@@ -4,9 +4,10 @@ from __future__ import annotations
 
 from collections.abc import Iterable
 from functools import cache
+from operator import attrgetter
 
 from ..assembled import assemble
-from ..base import Parameter
+from ..base import Interval, Parameter
 from ..parts import Composition, Parts
 from .anisotropy import ANISOTROPY
 from .body import BODY
@@ -61,11 +62,30 @@ def in_order(effects: Iterable[str]) -> tuple[str, ...]:
 
 def parts_of(*effects: str) -> Parts:
     """What a model of the given effects is composed of; raises as :func:`compose`."""
-    names = in_order(effects)
+    return _put_together(in_order(effects), ())
+
+
+def _put_together(names: tuple[str, ...], switched: tuple[str, ...]) -> Parts:
+    switches = {name: attrgetter(SWITCH + name) if name in switched else None for name in names}
     parts = Parts()
     for name in names:
-        parts = EFFECTS[name].add(parts, frozenset(names))
+        parts = EFFECTS[name].add(parts, switches)
     return parts
+
+
+SWITCH = "with_"
+"""What a switch of :func:`switchable` is called: this and the name of the effect."""
+SWITCHED = ("lobe", "fresnel", "masking", "interreflection", "trade_off")
+"""Effects that have one: those that some model without them is no special case of (see :class:`Effect`)."""
+
+
+def switchable(*effects: str) -> type[Composition]:
+    """A model of the given effects in which those of :data:`SWITCHED` have a switch, a parameter that is 0 or 1: with them
+    at 0, and the parameters of other effects at their neutral values, it is the model of any subset.
+
+    It is for comparing many subsets in one program. Raises as :func:`compose`.
+    """
+    return _composed(in_order(effects), tuple(name for name in SWITCHED if name in effects))
 
 
 STARTS = 60
@@ -83,20 +103,22 @@ _SHAPES = classmethod(_shapes)
 
 
 @cache
-def _composed(names: tuple[str, ...]) -> type[Composition]:
+def _composed(names: tuple[str, ...], switched: tuple[str, ...] = ()) -> type[Composition]:
     parameters: dict[str, Parameter] = {}
     for name in names:
         declared = {n: f.metadata["parameter"] for n, f in EFFECTS[name].parameters.items()}
         parameters = EFFECTS[name].declare(parameters | declared)
+    for name in switched:
+        parameters[SWITCH + name] = Parameter("", f"1 with {name}, 0 without", "1", Interval(0, 1), (0, 1), 1.0)
     cls = assemble(
-        "+".join(names),
+        "+".join(names) + (" with switches" if switched else ""),
         parameters,
         Composition.evaluate,
         doc="; ".join(EFFECTS[name].meaning for name in names) + ".",
         references=tuple(dict.fromkeys(key for name in names for key in EFFECTS[name].references)),
         anisotropic="anisotropy" in names,
         base=Composition,
-        parts=parts_of(*names),
+        parts=_put_together(names, switched),
         effects=names,
         shapes=_SHAPES,
     )
@@ -104,4 +126,4 @@ def _composed(names: tuple[str, ...]) -> type[Composition]:
     return cls
 
 
-__all__ = ["EFFECTS", "Effect", "compose", "in_order", "parts_of"]
+__all__ = ["EFFECTS", "SWITCH", "SWITCHED", "Effect", "compose", "in_order", "parts_of", "switchable"]

@@ -8,7 +8,7 @@ from typing import Any
 from ..common import stretched_shapes
 from ..ndf.stretched import Stretched
 from ..parts import Lobe, Parts
-from .effect import Declared, Effect, Shapes
+from .effect import Declared, Effect, Present, Shapes, Values
 
 
 def _stretched(lobe: Lobe) -> Lobe:
@@ -18,7 +18,7 @@ def _stretched(lobe: Lobe) -> Lobe:
     return replace(lobe, facets=facets)
 
 
-def _add(parts: Parts, effects: frozenset[str]) -> Parts:
+def _add(parts: Parts, effects: Present) -> Parts:
     first, *others = parts.lobes
     return replace(parts, lobes=(_stretched(first), *others))
 
@@ -39,12 +39,17 @@ def _start(half_width: float, shapes: Shapes) -> Shapes:
     return stretched_shapes(shapes, "alpha")
 
 
+def _neutral(values: Values, others: frozenset[str]) -> Values:
+    return values | {"alpha_x": values["alpha"], "alpha_y": values["alpha"]}
+
+
 ANISOTROPY = Effect(
     "anisotropy",
     "an anisotropic lobe: slopes stretched along the tangent",
     "D(h) = D_round(n.h/q)/q^4, q^2 = h_x^2 alpha_y/alpha_x + h_y^2 alpha_x/alpha_y + h_z^2, of width sqrt(alpha_x alpha_y)",
     {},
     _add,
+    neutral=_neutral,
     needs=("lobe",),
     declare=_declare,
     start=_start,

@@ -10,7 +10,7 @@ from jaxtyping import Array, Float
 from ...geometry import Geometry
 from ..common import diffuse_parameter
 from ..parts import Parts
-from .effect import Effect
+from .effect import Effect, Present, at
 
 
 def _albedo(m: Any, g: Geometry) -> Float[Array, "..."]:
@@ -18,7 +18,7 @@ def _albedo(m: Any, g: Geometry) -> Float[Array, "..."]:
     return albedo
 
 
-def _add(parts: Parts, effects: frozenset[str]) -> Parts:
+def _add(parts: Parts, effects: Present) -> Parts:
     return replace(parts, albedo=_albedo)
 
 
@@ -28,5 +28,6 @@ BODY = Effect(
     "diffuse/pi",
     {"diffuse": diffuse_parameter()},
     _add,
+    neutral=at(diffuse=0),
     references=("lambert1760",),
 )

@@ -11,8 +11,8 @@ from jaxtyping import Array, Float
 
 from ...geometry import Geometry
 from ..base import NOT_NEGATIVE, POSITIVE, parameter
-from ..parts import Parts, Term
-from .effect import Effect, Shapes
+from ..parts import Parts, Term, mixed
+from .effect import Effect, Present, Shapes, at
 
 
 def _scattering(m: Any, g: Geometry) -> Float[Array, "..."]:
@@ -29,8 +29,8 @@ def _risen(m: Any, g: Geometry) -> Float[Array, "..."]:
     return fresnel * _scattering(m, g)
 
 
-def _add(parts: Parts, effects: frozenset[str]) -> Parts:
-    term: Term = _risen if "fresnel" in effects else _scattering
+def _add(parts: Parts, effects: Present) -> Parts:
+    term: Term = mixed(effects["fresnel"], _scattering, _risen) if "fresnel" in effects else _scattering
     return replace(parts, terms=(*parts.terms, term))
 
 
@@ -56,6 +56,7 @@ DIFFRACTION = Effect(
         "c": parameter("fall-off", valid=NOT_NEGATIVE, search=(1e-3, 1e3), default=1, log=True),
     },
     _add,
+    neutral=at(scatter=0),
     start=_start,
     references=("low2012", "church1990"),
 )

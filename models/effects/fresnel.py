@@ -8,8 +8,8 @@ from jaxtyping import Array, Float
 
 from ...geometry import Geometry
 from ..fresnel import schlick
-from ..parts import Parts, Term
-from .effect import Declared, Effect
+from ..parts import Lobe, Parts, Term, mixed
+from .effect import Declared, Effect, Present, replaces
 from .lobe import LOBE
 
 
@@ -22,8 +22,11 @@ def risen(reflectance: Term) -> Term:
     return rise
 
 
-def _add(parts: Parts, effects: frozenset[str]) -> Parts:
-    return replace(parts, lobes=tuple(replace(lobe, reflectance=risen(lobe.reflectance)) for lobe in parts.lobes))
+def _add(parts: Parts, effects: Present) -> Parts:
+    def rising(lobe: Lobe) -> Lobe:
+        return replace(lobe, reflectance=mixed(effects["fresnel"], lobe.reflectance, risen(lobe.reflectance)))
+
+    return replace(parts, lobes=tuple(rising(lobe) for lobe in parts.lobes))
 
 
 def _declare(parameters: Declared) -> Declared:
@@ -40,6 +43,7 @@ FRESNEL = Effect(
     "F = specular + (1 - specular)(1 - cos theta_d)^5 in place of specular",
     {},
     _add,
+    neutral=replaces,
     needs=("lobe or diffraction",),
     declare=_declare,
     references=("schlick1994",),

@@ -13,7 +13,7 @@ from ...geometry import Geometry
 from .. import ndf
 from ..base import NOT_NEGATIVE, POSITIVE, parameter
 from ..parts import Lobe, Parts
-from .effect import Effect, Shapes
+from .effect import Effect, Present, Shapes, Values, at
 
 
 def width(m: Any) -> Float[Array, ""]:
@@ -31,14 +31,19 @@ def _reflectance(m: Any, g: Geometry) -> Float[Array, "..."]:
     return specular
 
 
-def _add(parts: Parts, effects: frozenset[str]) -> Parts:
-    return replace(parts, lobes=(Lobe(_facets, _reflectance),))
+def _add(parts: Parts, effects: Present) -> Parts:
+    return replace(parts, lobes=(Lobe(_facets, _reflectance, effects["lobe"]),))
 
 
 def _start(half_width: float, shapes: Shapes) -> Shapes:
     # GGX falls to half its height at tan^2(theta) = alpha^2 (sqrt(2) - 1)
     alpha = np.tan(half_width) / np.sqrt(np.sqrt(2) - 1)
     return [s | {"alpha": float(np.clip(k * alpha, 1e-6, 5))} for s in shapes for k in (0.1, 0.3, 0.6, 1.0, 2.0, 5.0)]
+
+
+def _neutral(values: Values, others: frozenset[str]) -> Values | None:
+    """No reflectance, unless it rises towards grazing."""
+    return None if "fresnel" in others else at(specular=0)(values, others)
 
 
 LOBE = Effect(
@@ -57,6 +62,7 @@ LOBE = Effect(
         "alpha": parameter("lobe width", valid=POSITIVE, search=(1e-9, 10), default=0.1, log=True),
     },
     _add,
+    neutral=_neutral,
     start=_start,
     references=("trowbridge1975", "walter2007", "hoffman2013"),
 )

@@ -11,7 +11,7 @@ from ...geometry import Geometry
 from ..masking import averted_area, smith_correlated
 from ..ndf.stretched import Stretched
 from ..parts import Parts
-from .effect import Effect
+from .effect import Effect, Present, replaces
 
 
 def _visibility(facets: Any, g: Geometry) -> Float[Array, "..."]:
@@ -24,8 +24,8 @@ def _visibility(facets: Any, g: Geometry) -> Float[Array, "..."]:
     return 0.25 / (g.cos_i * g.cos_o * (1 + light + viewer))
 
 
-def _add(parts: Parts, effects: frozenset[str]) -> Parts:
-    return replace(parts, visibility=_visibility)
+def _add(parts: Parts, effects: Present) -> Parts:
+    return replace(parts, visibility=_visibility, masked=effects["masking"])
 
 
 MASKING = Effect(
@@ -34,6 +34,7 @@ MASKING = Effect(
     "V = 1/(4 n.l n.v (1 + Lambda(l) + Lambda(v))) in place of 1/4",
     {},
     _add,
+    neutral=replaces,
     needs=("lobe",),
     references=("smith1967", "heitz2014"),
 )

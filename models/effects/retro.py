@@ -12,7 +12,7 @@ from .. import ndf
 from ..base import NOT_NEGATIVE, POSITIVE, parameter
 from ..microfacet import microfacet
 from ..parts import Parts, implicit
-from .effect import Effect, Shapes, crossed
+from .effect import Effect, Present, Shapes, at, crossed
 
 
 def _lobe(m: Any, g: Geometry) -> Float[Array, "..."]:
@@ -22,7 +22,7 @@ def _lobe(m: Any, g: Geometry) -> Float[Array, "..."]:
     return microfacet(facets(across / total, along / total), m.retro, implicit(facets, g))
 
 
-def _add(parts: Parts, effects: frozenset[str]) -> Parts:
+def _add(parts: Parts, effects: Present) -> Parts:
     return replace(parts, terms=(*parts.terms, _lobe))
 
 
@@ -48,6 +48,7 @@ RETRO = Effect(
         ),
     },
     _add,
+    neutral=at(retro=0),
     start=_start,
     references=("belcour2014",),
 )

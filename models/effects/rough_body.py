@@ -11,14 +11,14 @@ from ...geometry import Geometry
 from ..base import NOT_NEGATIVE, parameter
 from ..diffuse import oren_nayar
 from ..parts import Parts
-from .effect import Effect, Shapes, crossed
+from .effect import Effect, Present, Shapes, at, crossed
 
 
 def _body(albedo: Float[Array, "..."], m: Any, g: Geometry) -> Float[Array, "..."]:
     return oren_nayar(albedo, m.sigma, g)
 
 
-def _add(parts: Parts, effects: frozenset[str]) -> Parts:
+def _add(parts: Parts, effects: Present) -> Parts:
     return replace(parts, body=_body)
 
 
@@ -37,6 +37,7 @@ ROUGH_BODY = Effect(
         )
     },
     _add,
+    neutral=at(sigma=0),
     needs=("body",),
     start=_start,
     references=("oren1994",),

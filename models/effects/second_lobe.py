@@ -1,4 +1,4 @@
-"""A second lobe beside the first one."""
+"""A second lobe, which shares the surface term with the first one."""
 
 from __future__ import annotations
 
@@ -7,24 +7,29 @@ from typing import Any
 
 from jaxtyping import Array, Float
 
-from ...geometry import Geometry
 from .. import ndf
-from ..base import NOT_NEGATIVE, POSITIVE, parameter
-from ..parts import Lobe, Parts
-from .effect import Effect, Shapes, crossed
+from ..base import POSITIVE, Interval, parameter
+from ..parts import Parts
+from .effect import Effect, Present, Shapes, at, crossed
 
 
 def _facets(m: Any) -> ndf.GGX:
     return ndf.GGX(m.alpha_2)
 
 
-def _reflectance(m: Any, g: Geometry) -> Float[Array, "..."]:
-    specular: Float[Array, "..."] = m.specular_2
-    return specular
+def _add(parts: Parts, effects: Present) -> Parts:
+    (first,) = parts.lobes
+    present = first.share
 
+    def narrow(m: Any) -> Float[Array, ""]:
+        share: Float[Array, ""] = 1 - m.share
+        return share if present is None else present(m) * share
 
-def _add(parts: Parts, effects: frozenset[str]) -> Parts:
-    return replace(parts, lobes=(*parts.lobes, Lobe(_facets, _reflectance)))
+    def wide(m: Any) -> Float[Array, ""]:
+        share: Float[Array, ""] = m.share
+        return share if present is None else present(m) * share
+
+    return replace(parts, lobes=(replace(first, share=narrow), replace(first, facets=_facets, share=wide)))
 
 
 def _start(half_width: float, shapes: Shapes) -> Shapes:
@@ -35,19 +40,15 @@ def _start(half_width: float, shapes: Shapes) -> Shapes:
 SECOND_LOBE = Effect(
     "second_lobe",
     "a second lobe with the GGX distribution",
-    "specular_2 D/4 with D of alpha_2, with the same Fresnel and masking terms as the first",
+    "(1 - share) F D V + share F D_2 V_2 in place of F D V, D_2 and V_2 of alpha_2",
     {
-        "specular_2": parameter(
-            "reflectance of a facet of the second lobe at normal incidence",
-            per_channel=True,
-            linear=True,
-            valid=NOT_NEGATIVE,
-            search=(0, 1),
-            default=0.02,
+        "share": parameter(
+            "share of the second lobe in the surface term", per_channel=True, linear=True, valid=Interval(0, 1), default=0.3
         ),
         "alpha_2": parameter("width of the second lobe", valid=POSITIVE, search=(1e-9, 10), default=0.4, log=True),
     },
     _add,
+    neutral=at(share=0),
     needs=("lobe",),
     start=_start,
     references=("cook1982",),

@@ -8,7 +8,7 @@ from typing import Any
 from .. import ndf
 from ..base import POSITIVE, parameter
 from ..parts import Parts
-from .effect import Effect, Shapes
+from .effect import Effect, Present, Shapes, at
 from .lobe import width
 
 
@@ -16,7 +16,7 @@ def _facets(m: Any) -> ndf.GTR:
     return ndf.GTR(width(m), m.gamma)
 
 
-def _add(parts: Parts, effects: frozenset[str]) -> Parts:
+def _add(parts: Parts, effects: Present) -> Parts:
     first, *others = parts.lobes
     return replace(parts, lobes=(replace(first, facets=_facets), *others))
 
@@ -33,6 +33,7 @@ TAIL = Effect(
     "D = k/(sin^2 theta_h + alpha^2 cos^2 theta_h)^gamma",
     {"gamma": parameter("fall-off of the tail (2: GGX, 1: Berry)", valid=POSITIVE, search=(0.01, 1e7), default=2, log=True)},
     _add,
+    neutral=at(gamma=2),
     needs=("lobe",),
     start=_start,
     references=("burley2012", "hoffman2013"),
