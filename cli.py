@@ -380,12 +380,15 @@ def _writable(out_dir: str) -> Path:
 
 
 def _keep_programs() -> None:
-    """Have JAX keep compiled programs from run to run in the user's cache directory (it reads this when imported)."""
+    """Keep compiled programs from run to run in the user's cache directory, JAX's own (it reads this when imported) and ours."""
     from platformdirs import user_cache_path
 
-    os.environ.setdefault("JAX_COMPILATION_CACHE_DIR", str(user_cache_path("brdfit") / "programs"))
+    directory = os.environ.setdefault("JAX_COMPILATION_CACHE_DIR", str(user_cache_path("brdfit") / "programs"))
     os.environ.setdefault("JAX_PERSISTENT_CACHE_MIN_COMPILE_TIME_SECS", "0")
     os.environ.setdefault("JAX_PERSISTENT_CACHE_MIN_ENTRY_SIZE_BYTES", "-1")
+    from .stored_programs import store_in
+
+    store_in(directory)
 
 
 def _line(f: Fit) -> str:

@@ -1,16 +1,19 @@
-"""How this package compiles: with the compiler's settings that pay for programs that run for a second or two."""
+"""How this package compiles: once for each kind of arguments, with the settings that pay for programs of a second or two."""
 
 from __future__ import annotations
 
+import uuid
 from collections import defaultdict
-from collections.abc import Callable, Hashable
+from collections.abc import Callable, Hashable, Sequence
 from functools import cache, wraps
 from threading import Lock
-from typing import Any, ParamSpec, TypeVar
+from typing import Any, NamedTuple, ParamSpec, TypeVar
 
-import equinox as eqx
 import jax
 import jax.numpy as jnp
+
+from . import stored_programs
+from .stored_programs import Array, Placeholder
 
 P = ParamSpec("P")
 R = TypeVar("R")
@@ -19,45 +22,68 @@ OPTIONS = {"xla_cpu_use_fusion_emitters": False}
 """XLA's newer way of generating loops takes up to twice as long to compile as the older one, and the programs are no faster
 for it (benchmarks/cold_start.py): the first fit of five models took 38 s of processor without it, 54 s with it."""
 
-_making = Lock()
+
+class _Compiled(NamedTuple):
+    """A program from arrays to arrays, and what its result is beside them."""
+
+    run: Callable[..., Sequence[Any]]
+    result: Any
+    """The result with a :class:`Placeholder` for each array."""
+
+    def __call__(self, arrays: list[Any]) -> Any:
+        out = iter(self.run(*arrays))
+        return jax.tree.map(lambda x: next(out) if isinstance(x, Placeholder) else x, self.result)
 
 
 def program(function: Callable[P, R]) -> Callable[P, R]:
     """Compile a function for the shapes of its arrays; all else is static. For calls from Python, not from a program.
 
-    Threads that ask at once for the same program wait for the one that compiles it.
+    Threads that ask at once for the same program wait for the one that compiles it. Where programs are stored
+    (:func:`brdfit.stored_programs.store_in`) one that an earlier run compiled is not even traced again.
     """
-
-    @cache
-    def compiled() -> Any:
-        compiler: Any = eqx.filter_jit  # passes on what it does not know
-        return compiler(function, compiler_options=_understood())
-
-    first: defaultdict[Hashable, Lock] = defaultdict(Lock)
-    made: set[Hashable] = set()
+    made: dict[Hashable, _Compiled] = {}
+    turns: defaultdict[Hashable, Lock] = defaultdict(Lock)
 
     @wraps(function)
     def call(*args: P.args, **kwargs: P.kwargs) -> R:
-        kind = _kind((args, kwargs))
-        result: R
-        if kind in made:
-            result = compiled()(*args, **kwargs)
-            return result
-        with _making:
-            it, turn = compiled(), first[kind]
-        with turn:
-            result = it(*args, **kwargs)
-            made.add(kind)
+        leaves, structure = jax.tree.flatten((args, kwargs))
+        kinds = [Array(x.shape, str(x.dtype)) if hasattr(x, "dtype") else x for x in leaves]
+        kind = structure, *kinds, jnp.result_type(float)
+        if kind not in made:
+            with turns[kind]:
+                if kind not in made:
+                    made[kind] = _compiled(function, structure, leaves, kinds)
+        result: R = made[kind]([x for x in leaves if hasattr(x, "dtype")])
         return result
 
     return call
 
 
-def _kind(arguments: Any) -> Hashable:
-    """What a program is compiled for: shapes and types of arrays, and all else as it is."""
-    leaves, structure = jax.tree.flatten(arguments)
-    kinds = ((x.shape, x.dtype) if hasattr(x, "dtype") else x for x in leaves)
-    return structure, *kinds, jnp.result_type(float)
+def _compiled(function: Callable[..., Any], structure: Any, leaves: list[Any], kinds: list[Any]) -> _Compiled:
+    """The program for arguments like these, stored or compiled."""
+    options = _understood()
+    key = stored_programs.key(function, jax.tree.unflatten(structure, kinds), options)
+    if key is not None and (kept := stored_programs.load(key)) is not None:
+        return _Compiled(*kept)
+    result: Any = None
+
+    def flat(*arrays: Any) -> list[Any]:
+        nonlocal result
+        given = iter(arrays)
+        args, kwargs = jax.tree.unflatten(structure, [next(given) if isinstance(k, Array) else k for k in kinds])
+        out, form = jax.tree.flatten(function(*args, **kwargs))
+        traced = [hasattr(x, "dtype") for x in out]
+        result = jax.tree.unflatten(form, [Placeholder() if t else x for x, t in zip(out, traced, strict=True)])
+        return [x for x, t in zip(out, traced, strict=True) if t]
+
+    # Guard: JAX finds a compiled program again by its text and name, and what it found cannot be stored: functions are
+    # missing from it when it runs (tests/test_programs.py::test_stored_programs). A name of its own is never found.
+    flat.__name__ = function.__name__ + ("" if key is None else f"_{uuid.uuid4().hex}")
+    arrays = [x for x in leaves if hasattr(x, "dtype")]
+    run = jax.jit(flat, compiler_options=options).lower(*arrays).compile()
+    if key is not None:
+        stored_programs.save(key, run, result)
+    return _Compiled(run, result)
 
 
 @cache

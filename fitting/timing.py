@@ -1,4 +1,4 @@
-"""How long compiling took, as JAX itself reports it, kept apart from solving."""
+"""How long compiling and reading of programs took, as JAX itself reports it, kept apart from solving."""
 
 from __future__ import annotations
 
@@ -9,6 +9,8 @@ from contextlib import contextmanager
 from contextvars import ContextVar
 from dataclasses import dataclass, field
 from functools import cache
+
+from ..stored_programs import LOADED
 
 
 @dataclass
@@ -36,7 +38,7 @@ def _listen() -> None:
 
     def record(event: str, duration_secs: float, **kwargs: str | int) -> None:
         current = _current.get()
-        if current is not None and event.startswith("/jax/core/compile"):
+        if current is not None and event.startswith(("/jax/core/compile", LOADED)):
             now = time.perf_counter()
             current.spans.append((now - duration_secs, now))
 
