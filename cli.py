@@ -380,7 +380,7 @@ def _writable(out_dir: str) -> Path:
 
 
 def _keep_programs() -> None:
-    """Keep compiled programs from run to run in the user's cache directory, JAX's own (it reads this when imported) and ours."""
+    """Keep compiled programs from run to run in the user's cache directory, and have JAX do so (it looks when imported)."""
     from platformdirs import user_cache_path
 
     directory = os.environ.setdefault("JAX_COMPILATION_CACHE_DIR", str(user_cache_path("brdfit") / "programs"))

@@ -27,6 +27,7 @@ from typing import Any, NamedTuple
 
 import jax
 import jax.numpy as jnp
+import numpy as np
 
 from .files import replacing
 
@@ -63,7 +64,7 @@ def store_in(directory: str | os.PathLike[str] | None) -> None:
     _directory = None if directory is None else Path(directory)
 
 
-def key(function: Callable[..., Any], arguments: Any, options: dict[str, bool]) -> Path | None:
+def key(function: Callable[..., Any], arguments: Any, options: dict[str, bool | str]) -> Path | None:
     """Where the program of a function for such arguments is stored; None if nowhere."""
     if _directory is None:
         return None
@@ -92,6 +93,8 @@ def load(path: Path) -> tuple[Callable[..., Any], Any] | None:
         with suppress(OSError):
             path.unlink()
         return None
+    with suppress(OSError):
+        os.utime(path.parent)  # in use
     jax.monitoring.record_event_duration_secs(LOADED, time.perf_counter() - begin)
     return run, result
 
@@ -101,7 +104,7 @@ def _find_linear_algebra() -> None:
     """Guard: JAX looks up LAPACK when it lowers a call of it, and a program that is read is not lowered: it would call what
     has no address yet (tests/test_programs.py::test_stored_programs).
     """
-    jax.jit(jnp.linalg.eigh).lower(jnp.eye(1))
+    jax.jit(jax.lax.linalg.cholesky).lower(np.eye(1))
 
 
 def save(path: Path, run: jax.stages.Compiled, result: Any) -> None:

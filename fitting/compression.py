@@ -20,6 +20,7 @@ kink there, which no polynomial across it follows. Each half of a row therefore 
 from __future__ import annotations
 
 from dataclasses import dataclass
+from functools import cached_property
 
 import numpy as np
 from numpy.typing import NDArray
@@ -27,7 +28,7 @@ from numpy.typing import NDArray
 Reals = NDArray[np.float64]
 
 
-@dataclass(frozen=True)
+@dataclass(frozen=True, eq=False)
 class RowRules:
     """Gauss rules for all rows of a table. Rows with the same fitted cells and relative weights share one: a MERL table
     has some ninety.
@@ -56,23 +57,23 @@ class RowRules:
         """Weights ``[H, D, k]``."""
         return np.asarray(self.weights[self.pattern] * self.scale[..., None])
 
-    def groups(self, count: int) -> list[NDArray[np.intp]]:
-        """Rows, numbered over ``[H, D]``, in so many parts in which those of one rule stand together."""
-        return np.array_split(np.argsort(self.pattern.ravel(), kind="stable"), count)
-
-    def compress(self, transformed: Reals, rows: NDArray[np.intp]) -> tuple[Reals, Reals]:
-        """Values ``[C, rows, k]`` at the nodes of ``rows``, a part of :meth:`groups`, from their transformed values
-        ``[C, rows, P]``; and the weighted square sum ``[C]`` that they stand for.
-        """
-        pattern, scale = self.pattern.ravel()[rows], self.scale.ravel()[rows]
-        out = np.empty((*transformed.shape[:2], self.nodes.shape[1]))
-        kept = np.zeros(len(out))
+    @cached_property
+    def same(self) -> list[tuple[int, NDArray[np.intp]]]:
+        """Each rule with its rows, numbered over ``[H, D]``."""
+        order = np.argsort(self.pattern, axis=None, kind="stable")
+        pattern = self.pattern.ravel()[order]
         starts = np.flatnonzero(np.diff(pattern, prepend=-1))
-        for same in map(slice, starts, [*starts[1:], len(rows)]):
-            rule = pattern[same.start]
-            coefficients = transformed[:, same] @ self.analysis[rule]
-            out[:, same] = coefficients @ self.synthesis[rule]
-            kept += (coefficients**2).sum(-1) @ scale[same]
+        return [(int(pattern[a]), order[a:b]) for a, b in zip(starts, [*starts[1:], len(order)], strict=True)]
+
+    def compress(self, rows: Reals) -> tuple[Reals, float]:
+        """Values ``[H D, k]`` at the nodes, from the transformed values ``[H D, P]`` of a channel; and the weighted square
+        sum that they stand for.
+        """
+        out, kept = np.empty((len(rows), self.nodes.shape[1])), 0.0
+        for rule, at in self.same:
+            coefficients = rows[at] @ self.analysis[rule]
+            out[at] = coefficients @ self.synthesis[rule]
+            kept += float((coefficients**2).sum(-1) @ self.scale.ravel()[at])
         return out, kept
 
 

@@ -22,10 +22,11 @@ from .coordinates import Chart, charts
 from .effort import DEFAULT, Effort
 from .estimate import Judgement, judge, make_ready
 from .gram import Problem, Span, loss_errors
+from .grid_samples import compress
 from .losses import LOSSES, Loss, LossFunction, named_loss
 from .plan import RUNGS, plan
 from .result import Fit, Named, Optimum
-from .samples import Samples, compress, samples
+from .samples import Samples, samples
 from .search import Found, Stage, search, solve
 from .solver import Box, Minimum
 from .starts import Summary, starts, summarise
@@ -79,12 +80,13 @@ def prepare(
         kept = _prepared.setdefault(table, {})
         if key not in kept:
             cells, used = samples(table, max_angle, measure, effort.nodes)
-            aside = in_threads(lambda t: summarise(t, used), [table])
             values = table.planes[:, used]
             bound = loss.bind(values)
+            summary = in_threads(lambda t: summarise(t, used), [table])
+            named = in_threads(lambda v: _named_losses(v, bound), [values])
             kept.clear()
-            both = compress(cells, table, used, max_angle, bound) if compressed else cells
-            kept[key] = Prepared(both, used, next(aside), bound, _named_losses(values, bound))
+            both = compress(cells, table, used, max_angle, measure, bound) if compressed else cells
+            kept[key] = Prepared(both, used, next(summary), bound, next(named))
         return kept[key]
 
 

@@ -30,13 +30,18 @@ class Summary:
     """Albedo ``[C]`` of the body term: pi times the lower quartile of the table at theta_d below 45 degrees."""
 
 
+ALONG_PHI = 45
+"""Cells of a row along phi_d that a summary looks at."""
+
+
 def summarise(table: Table, used: NDArray[np.bool_]) -> Summary:
     """Half-width and body of the fitted cells of a table."""
     if isinstance(table.layout, HalfDifferenceGrid) and table.isotropic:
         # whole rows of the grid: no list of a million directions is made
         d = np.flatnonzero(table.layout.theta_d < np.radians(45))
-        rows = used[:, d]
-        values = table.planes[:, :, d]
+        along = slice(None, None, max(1, len(table.layout.phi_d) // ALONG_PHI))
+        rows = used[:, d, along]
+        values = table.planes[:, :, d, along]
         theta_d = np.broadcast_to(table.layout.theta_d[d][None, :, None], rows.shape)[rows]
         row = np.broadcast_to(np.arange(rows.shape[0])[:, None, None], rows.shape)[rows]
         angle = table.layout.theta_h

@@ -6,7 +6,8 @@ half/difference grid dl dv = 4 cos(theta_d) sin(theta_h) sin(theta_d) dtheta_h d
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, fields
+from functools import cached_property, lru_cache
 
 import numpy as np
 from numpy.typing import NDArray
@@ -44,6 +45,18 @@ class HalfDifferenceGrid:
         base = (len(self.theta_h), len(self.theta_d), len(self.phi_d))
         return base if self.phi_h is None else (len(self.phi_h), *base)
 
+    @cached_property
+    def _content(self) -> tuple[bytes | None, ...]:
+        return tuple(None if a is None else a.tobytes() for a in (getattr(self, f.name) for f in fields(self)))
+
+    def __eq__(self, other: object) -> bool:
+        """Whether all positions and edges are the same."""
+        return isinstance(other, HalfDifferenceGrid) and self._content == other._content
+
+    def __hash__(self) -> int:
+        """Of the content: what is made for a grid can be kept for the next table on it."""
+        return hash(self._content)
+
     def solid_angle(self) -> Reals:
         """Measure of each cell in sr^2, broadcastable to :attr:`shape` (an isotropic cell spans all of phi_h)."""
         h = -np.diff(np.cos(self.theta_h_edges))[:, None, None]
@@ -57,11 +70,25 @@ class HalfDifferenceGrid:
         """cos(theta_i) and cos(theta_o) of every cell, of shape ``(H, D, P)``; negative below the horizon."""
         return polar_cosines(self.theta_h[:, None, None], self.theta_d[:, None], self.phi_d)
 
+    def visible(self, max_angle: float, margin: float = 0.0) -> NDArray[np.bool_]:
+        """Cells ``(H, D, P)`` with both polar angles below ``max_angle`` radians and the horizon, or, with a ``margin`` of
+        cosine, hardly above. Not to be written to: kept for the next table on the same grid.
+        """
+        return _visible(self, max_angle, margin)
+
     def directions(self) -> tuple[Reals, Reals]:
         """Unit vectors to light and viewer, each ``[*shape, 3]``."""
         if self.phi_h is None:
             return directions(self.theta_h[:, None, None], self.theta_d[:, None], self.phi_d)
         return directions(self.theta_h[:, None, None], self.theta_d[:, None], self.phi_d, self.phi_h[:, None, None, None])
+
+
+@lru_cache(maxsize=4)
+def _visible(grid: HalfDifferenceGrid, max_angle: float, margin: float) -> NDArray[np.bool_]:
+    least = max(np.cos(max_angle), 0.0) - margin
+    cos_i, cos_o = grid.polar_cosines()
+    both: NDArray[np.bool_] = (cos_i > least) & (cos_o > least)
+    return both
 
 
 @dataclass(frozen=True, eq=False)

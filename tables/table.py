@@ -54,12 +54,11 @@ class Table:
         Cells at the limit itself are left out, to rounding: 80 degrees is a row of the MERL grid, and with the edge
         convention its cells lie beyond.
         """
-        limit = np.cos(max_angle)
         if isinstance(self.layout, HalfDifferenceGrid):
-            ci, co = self.layout.polar_cosines()
-        else:
-            wi, wo = self.layout.directions()
-            ci, co = wi[..., 2], wo[..., 2]
+            return self.mask & self.layout.visible(max_angle)
+        limit = np.cos(max_angle)
+        wi, wo = self.layout.directions()
+        ci, co = wi[..., 2], wo[..., 2]
         kept: NDArray[np.bool_] = self.mask & (ci > limit) & (co > limit) & (ci > 0) & (co > 0)
         return kept
 

@@ -1,7 +1,10 @@
-"""Programs of the package: the compiler's settings are optional, and threads share what is compiled."""
+"""Programs of the package: the compiler's settings are optional, threads share what is compiled, and so do runs."""
 
 from __future__ import annotations
 
+import os
+import subprocess
+import sys
 import time
 from concurrent.futures import ThreadPoolExecutor
 
@@ -9,7 +12,7 @@ import jax
 import jax.numpy as jnp
 import numpy as np
 import pytest
-from brdfit import programs
+from brdfit import programs, stored_programs
 from brdfit.fitting.threads import in_threads
 from brdfit.fitting.timing import Compilation, compilation
 
@@ -61,3 +64,86 @@ def test_compilation_of_threads_counts_once():
     with compilation() as here:
         list(in_threads(lambda n: jax.jit(lambda x: x + n)(1.0), [1, 2]))
     assert here.seconds > 0, "threads take over the context of the one that asks"
+
+
+SCRIPT = """
+import sys
+import jax, jax.numpy as jnp
+from brdfit import stored_programs
+from brdfit.programs import program
+
+stored_programs.KNOWN.add("__main__")
+stored_programs.store_in(sys.argv[1])
+traced = []
+
+@program
+def smallest(matrix, power, names):
+    traced.append(power)
+    return {"value": jnp.linalg.eigvalsh(matrix ** power)[0], "names": names, "none": None}
+
+matrix = jnp.asarray([[2.0, 1.0], [1.0, 3.0]])
+for power in (1, 2):
+    found = smallest(matrix, power, ("a", "b"))
+print(len(traced), f"{float(found['value']):.9g}", found["names"], found["none"])
+"""
+
+
+def test_stored_programs(tmp_path):
+    """A second process reads what the first compiled, linear algebra included, and traces nothing; what was damaged is
+    compiled again."""
+
+    def run():
+        done = subprocess.run([sys.executable, "-c", SCRIPT, tmp_path / "p"], capture_output=True, text=True, check=True)
+        return done.stdout.split(maxsplit=1)
+
+    first, second = run(), run()
+    assert first[0] == "2"
+    assert second == ["0", first[1]]
+    stored = list((tmp_path / "p").rglob("version-*/*"))
+    assert len(stored) == 2
+    stored[0].write_bytes(stored[0].read_bytes()[:100])
+    assert run() == ["1", first[1]]
+    assert run()[0] == "0"
+
+
+@pytest.fixture
+def store(tmp_path):
+    stored_programs.store_in(tmp_path)
+    yield stored_programs
+    stored_programs.store_in(None)
+
+
+def test_what_a_program_is_found_by(store):
+    """Shapes, types, static arguments, precision and what a function closes over; nothing from outside this package."""
+    from brdfit.fitting.losses import LOSSES
+    from brdfit.fitting.search import solve
+    from brdfit.models import MODELS
+
+    base = solve.__wrapped__, (stored_programs.Array((3,), "float64"), LOSSES["log"], MODELS["ward"][0])
+    others = [
+        (solve.__wrapped__, (stored_programs.Array((4,), "float64"), *base[1][1:])),
+        (solve.__wrapped__, (stored_programs.Array((3,), "float32"), *base[1][1:])),
+        (solve.__wrapped__, (base[1][0], LOSSES["low"], MODELS["ward"][0])),
+        (solve.__wrapped__, (*base[1][:2], MODELS["ward"][1])),
+        (programs.program, base[1]),
+    ]
+    keys = {store.key(f, arguments, {}) for f, arguments in (base, *others)} | {store.key(*base, {"option": True})}
+    with jax.enable_x64(True):
+        keys.add(store.key(*base, {}))
+    assert len(keys) == len(others) + 3
+    assert None not in keys
+    assert store.key(*base, {}) in keys
+    transform, inverse = LOSSES["log"].transform, LOSSES["log"].inverse  # two functions on one line of the source
+    assert store.key(transform, (), {}) != store.key(inverse, (), {})
+    for outside in (lambda: 0, type("Mine", (MODELS["ward"][0],), {}), test_stored_programs):
+        assert store.key(solve.__wrapped__, (outside,), {}) is None
+
+
+def test_programs_of_old_versions_are_deleted(store, tmp_path):
+    for name, days in (("version-old", 31), ("version-new", 1)):
+        (tmp_path / name).mkdir()
+        then = time.time() - 86400 * days
+        os.utime(tmp_path / name, (then, then))
+    run = jax.jit(lambda x: 2 * x).lower(1.0).compile()
+    store.save(tmp_path / "version-mine" / "program", run, stored_programs.Placeholder())
+    assert sorted(p.name for p in tmp_path.iterdir()) == ["version-mine", "version-new"]
