@@ -89,7 +89,7 @@ class _Rows:
 @lru_cache(maxsize=1)
 def _rows(grid: HalfDifferenceGrid, limit: float, along_phi: int) -> _Rows:
     visible = grid.visible(limit, 1e-12)
-    part = _first(visible.any((1, 2))), _first(visible.any((0, 2)))
+    part = _first(np.any(visible, (1, 2))), _first(np.any(visible, (0, 2)))
     h, d = grid.theta_h[part[0], None, None], grid.theta_d[None, part[1], None]
     # Guard: cells that are not fitted have weight 0, and 0 * inf = NaN: they get a harmless direction
     # (tests/test_samples.py::test_unused_cells_are_harmless).

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator
 from dataclasses import dataclass
 from itertools import chain
 from typing import Any, NamedTuple
@@ -25,6 +24,9 @@ COARSE_BLOCKS = (6, 3)
 """Blocks of cells, and compressed blocks, for polishing the best shapes."""
 FINISHED = 3
 """Distinct optima of the coarse table that are carried to the whole one, at most."""
+ROUGH = 1e-4
+"""Relative decrease of the cost at which the first polish ends, on as few blocks as the colours were fitted on: what has
+come together by then goes on as one."""
 SAME = 1e-3
 """Relative difference of cost below which two starts count as having reached the same optimum."""
 WORTH = 1.3
@@ -75,6 +77,8 @@ class Candidate(NamedTuple):
     problem: Problem
     box: Box
     minimum: Minimum
+    starts: int = 1
+    """How many starts ended here."""
 
 
 def search(problems: list[tuple[Problem, Box, list[NDArray[np.float64]]]], effort: Effort = DEFAULT) -> Found:
@@ -101,18 +105,9 @@ def search(problems: list[tuple[Problem, Box, list[NDArray[np.float64]]]], effor
         best = polished[0]
         if not best.problem.chart.continues(np.asarray(best.minimum.x), problem.channels):
             break
-    distinct: list[Candidate] = []
-    counts: list[int] = []
-    for candidate in polished:
-        if distinct and candidate.cost <= distinct[-1].cost * (1 + SAME):
-            counts[-1] += 1
-        else:
-            distinct.append(candidate)
-            counts.append(1)
-    worth = [d for d in distinct[:FINISHED] if d.cost <= WORTH * distinct[0].cost] or distinct[:1]
-    finished = list(in_threads(lambda d: _candidate(d.problem, d.box, solve(d.problem, d.minimum.x, d.box, whole)), worth))
-    costs = [c.cost for c in (*finished, *distinct[len(finished) :])]
-    optima = [Optimum(float(np.sqrt(cost)), count) for cost, count in zip(costs, counts, strict=True)]
+    distinct = _distinct(polished)
+    finished = _polish([d for d in distinct[:FINISHED] if d.cost <= WORTH * distinct[0].cost] or distinct[:1], whole)
+    optima = [Optimum(float(np.sqrt(c.cost)), c.starts) for c in (*finished, *distinct[len(finished) :])]
     best = min(finished, key=_cost)
     passes = 0 if fast else sum(int(c.minimum.steps) for c in finished)
     return Found(best.problem, best.box, best.minimum, tried, _merged(optima), passes, not fast)
@@ -120,8 +115,8 @@ def search(problems: list[tuple[Problem, Box, list[NDArray[np.float64]]]], effor
 
 def _polished(
     problem: Problem, box: Box, starts: list[NDArray[np.float64]], colour: Stage, coarse: Stage, count: int
-) -> Iterator[Candidate]:
-    """The best starts after a refit of the linear coordinates, polished; of doubles only one."""
+) -> list[Candidate]:
+    """The best starts after a refit of the linear coordinates, polished, roughly first; of doubles only one."""
     linear = np.asarray([c.linear for c, _ in problem.chart.vector(problem.channels)])
     colours = Box(box.lower, box.upper, box.free & linear)
 
@@ -143,12 +138,33 @@ def _polished(
         if len(kept) < count and not (kept and c.cost <= kept[-1].cost * (1 + 1e-9)):
             kept.append(c)
     kept = kept or ranked[:1]
-    return in_threads(lambda c: _candidate(problem, box, solve(problem, c.minimum.x, box, coarse)), kept)
+    rough = Stage.of(colour.span, ROUGH, 1.0)
+    return _polish(_distinct(_polish(kept, rough)), coarse)
 
 
-def _candidate(problem: Problem, box: Box, minimum: Minimum) -> Candidate:
+def _polish(candidates: list[Candidate], stage: Stage) -> list[Candidate]:
+    """All coordinates free, from where each candidate is."""
+
+    def polished(c: Candidate) -> Candidate:
+        return _candidate(c.problem, c.box, solve(c.problem, c.minimum.x, c.box, stage), c.starts)
+
+    return list(in_threads(polished, candidates))
+
+
+def _distinct(candidates: list[Candidate]) -> list[Candidate]:
+    """Candidates by cost, those of nearly one cost as one."""
+    distinct: list[Candidate] = []
+    for c in sorted(candidates, key=_cost):
+        if distinct and c.cost <= distinct[-1].cost * (1 + SAME):
+            distinct[-1] = distinct[-1]._replace(starts=distinct[-1].starts + c.starts)
+        else:
+            distinct.append(c)
+    return distinct
+
+
+def _candidate(problem: Problem, box: Box, minimum: Minimum, starts: int = 1) -> Candidate:
     cost = float(minimum.cost)
-    return Candidate(cost if np.isfinite(cost) and cost < 1e290 else np.inf, problem, box, minimum)
+    return Candidate(cost if np.isfinite(cost) and cost < 1e290 else np.inf, problem, box, minimum, starts)
 
 
 def _cost(candidate: Candidate) -> float:
