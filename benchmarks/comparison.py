@@ -1,0 +1,100 @@
+"""Every named model on every table of a folder under three losses: makes docs/comparison.md and its pictures.
+
+    python benchmarks/comparison.py TABLES --keep comparison.jsonl --out docs/comparison.md [--every 2]
+
+TABLES holds MERL .binary files, of which every N-th is taken. Each is fitted with each model under each loss, without error
+bars (search_only.py). Finished fits are kept as lines of JSON, with their parameters; an interrupted run goes on from them.
+"""
+
+from __future__ import annotations
+
+import argparse
+import json
+import os
+import sys
+import time
+from concurrent.futures import ThreadPoolExecutor
+from pathlib import Path
+from typing import Any
+
+import brdfit
+import numpy as np
+from brdfit.fitting.effort import Effort
+from brdfit.models import MODELS, parameter_values
+from comparison_page import LOSSES, write
+from search_only import search
+
+USUAL = Effort(path="compressed", starts=3, rtol=1e-5)
+"""Settings of nearly all models: all their starting shapes, three of them polished."""
+COSTLY = Effort(path="compressed", shapes=0.5, starts=1, rtol=1e-4)
+"""Settings of the models whose passes over the table take five times those of the others, and more."""
+EFFORT = dict.fromkeys(("htsg", "stam_diffraction", "granier_heidrich"), COSTLY)
+CHECKED = 8
+"""Of so many tables one has its errors compared with those of all cells."""
+
+Row = dict[str, Any]
+
+
+def fitted(table: brdfit.Table, model: str, loss: str, check: bool) -> Row:
+    """One fit as plain values."""
+    found = search(table, model, loss, EFFORT.get(model, USUAL), cells=tuple(LOSSES) if check else ())
+    return {
+        "material": table.material,
+        "model": model,
+        "loss": loss,
+        "error": found.error,
+        "of_cells": found.of_cells,
+        "parameters": {n: np.asarray(v).tolist() for n, v in parameter_values(found.model).items()},
+        "at_bound": list(found.at_bound),
+        "converged": found.converged,
+        "reason": found.reason,
+        "seconds": round(found.seconds, 4),
+    }
+
+
+def run(tables: list[Path], keep: Path) -> tuple[list[Row], float]:
+    """All fits, those that are missing made, and how long that took."""
+    rows = [json.loads(line) for line in keep.read_text(encoding="utf-8").splitlines()] if keep.exists() else []
+    done = {(r["material"], r["model"], r["loss"]) for r in rows}
+    begin = time.perf_counter()
+    with ThreadPoolExecutor(os.cpu_count()) as pool, keep.open("a", encoding="utf-8") as file:
+        for k, path in enumerate(tables):
+            table = None
+            for loss in LOSSES:
+                missing = [m for m in MODELS if (path.stem, m, loss) not in done]
+                if not missing:
+                    continue
+                table = table or brdfit.load(path)
+                check = k % CHECKED == 0
+                for row in pool.map(lambda m, t=table, on=loss, c=check: fitted(t, m, on, c), missing):
+                    rows.append(row)
+                    file.write(json.dumps(row) + "\n")
+                file.flush()
+            print(f"{k + 1}/{len(tables)} {path.stem} {time.perf_counter() - begin:.0f} s", file=sys.stderr, flush=True)
+    return rows, time.perf_counter() - begin
+
+
+def main() -> None:
+    """Parse, fit what is missing, write."""
+    parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
+    parser.add_argument("tables", type=Path)
+    parser.add_argument("--every", type=int, default=1, help="take every N-th table")
+    parser.add_argument("--keep", type=Path, required=True, help="finished fits, lines of JSON")
+    parser.add_argument("--out", type=Path, required=True)
+    args = parser.parse_args()
+    tables = sorted(args.tables.glob("*.binary"))[:: args.every]
+    rows, took = run(tables, args.keep)
+    names = {p.stem for p in tables}
+    every = f" --every {args.every}" if args.every > 1 else ""
+    command = f"python benchmarks/comparison.py TABLES --keep comparison.jsonl --out docs/comparison.md{every}"
+    settings = (
+        f"{USUAL.starts} starts polished on the compressed table, to a relative decrease of the cost of {USUAL.rtol:g}; for "
+        f"{', '.join(f'`{m}`' for m in EFFORT)}, whose passes take longest, {COSTLY.starts} of half as many shapes, to "
+        f"{COSTLY.rtol:g}. The fits of this run took {took:.0f} s."
+    )
+    write(args.out, [r for r in rows if r["material"] in names], brdfit.load(tables[0]), command, settings)
+    print(args.out)
+
+
+if __name__ == "__main__":
+    main()

@@ -1,0 +1,344 @@
+"""The page of the comparison: ranks, what to use for which kind of material, a heat map, and error against cost."""
+
+from __future__ import annotations
+
+import csv
+import json
+import os
+import platform
+from datetime import date
+from itertools import pairwise
+from pathlib import Path
+from typing import Any
+
+import brdfit
+import numpy as np
+from brdfit.models import MODELS, model, parameters_of
+from brdfit.reports.plots import new_figure, styled
+from brdfit.tradeoff.evaluation import Evaluation, direct
+from brdfit.tradeoff.pareto import front
+from brdfit.tradeoff.sample import draw
+from brdfit.tradeoff.timing import interleaved
+
+LOSSES = ("perceptual", "log", "ngan")
+"""What people see, what a fit minimises by default, and what the published fits minimised."""
+KINDS = {
+    "metals": ("alum-bronze aluminium black-oxidized-steel brass chrome nickel ss440 tungsten-carbide"),
+    "metallic paints": (
+        "blue-metallic-paint color-changing-paint1 color-changing-paint3 gold-metallic-paint3 green-metallic-paint "
+        "pearl-paint silver-metallic-paint2 two-layer-silver"
+    ),
+    "plain paints": "purple-paint white-paint yellow-paint",
+    "plastics": (
+        "blue-acrylic gray-plastic polyethylene red-phenolic red-specular-plastic specular-green-phenolic "
+        "specular-orange-phenolic specular-white-phenolic white-acrylic"
+    ),
+    "fabrics": "black-fabric dark-specular-fabric green-fabric light-brown-fabric pink-fabric red-fabric white-fabric",
+    "stones and woods": "fruitwood-241 hematite natural-209 pink-jasper special-walnut-224",
+}
+"""Materials by what they are."""
+KIND = {material: kind for kind, materials in KINDS.items() for material in materials.split()}
+CLOSE = 1.1
+"""A model whose error is below this multiple of the best one's is as good in practice."""
+REPEATS = 30
+
+RANKS = """\
+By loss and for all three: the error over the smallest of any model on the same material, geometric mean over the
+materials; *worst*, the largest such ratio of any material and loss. *Numbers*: parameters of three channels. *At a
+bound*: fits in which a parameter that bends the lobe ends at a bound of its search box; colours at 0 do not count.
+*Fit*: seconds of the search, median, nothing compiled, as many fits at a time as there are cores. *ns*: one pair of
+directions, three channels, float32, one core, lower quartile."""
+
+Row = dict[str, Any]
+Reals = np.ndarray
+
+
+class Comparison:
+    """Errors ``[models, materials, losses]`` of the finished fits, NaN where there is none."""
+
+    def __init__(self, rows: list[Row], cost: dict[str, float]) -> None:
+        self.rows, self.cost = rows, cost
+        kinds = list(KINDS)
+        known = {r["material"] for r in rows}
+        self.materials = sorted(known, key=lambda m: (kinds.index(KIND[m]) if m in KIND else len(kinds), m))
+        self.models = list(MODELS)
+        at = {(r["model"], r["material"], r["loss"]): r["error"] for r in rows}
+        self.errors = np.array(
+            [[[at.get((m, t, e), np.nan) for e in LOSSES] for t in self.materials] for m in self.models], float
+        )
+        self.ratio = self.errors / np.nanmin(self.errors, 0)
+        overall = {m: self.typical(m) for m in self.models}
+        self.ranked = sorted(self.models, key=lambda m: overall[m])
+
+    def over_best(self, name: str, loss: str | None = None, kind: str | None = None) -> Reals:
+        """Error of a model over the smallest of any model, on the materials of a kind, under one loss or all."""
+        materials = [i for i, t in enumerate(self.materials) if kind is None or KIND.get(t) == kind]
+        losses = range(len(LOSSES)) if loss is None else [LOSSES.index(loss)]
+        return self.ratio[self.models.index(name)][np.ix_(materials, losses)]
+
+    def typical(self, name: str, loss: str | None = None, kind: str | None = None) -> float:
+        """Geometric mean of :meth:`over_best`."""
+        return float(np.exp(np.nanmean(np.log(self.over_best(name, loss, kind)))))
+
+    def wins(self, name: str, loss: str, kind: str) -> int:
+        """On how many materials of a kind no model has a smaller error."""
+        return int((self.over_best(name, loss, kind) <= 1).sum())
+
+    def of(self, name: str) -> list[Row]:
+        return [r for r in self.rows if r["model"] == name]
+
+
+def costs(rows: list[Row], table: brdfit.Table) -> dict[str, float]:
+    """Nanoseconds of one core's time to evaluate each model in one pair of directions, three channels, float32."""
+    sample = draw(table, 80.0, "solid_angle")
+    fits = {r["model"]: r["parameters"] for r in rows if r["material"] == table.material and r["loss"] == LOSSES[0]}
+    calls = {name: Evaluation(direct, model(name, **p), sample) for name, p in fits.items()}
+    times = interleaved(calls, REPEATS, 60.0)
+    return {name: t.low / calls[name].count * 1e9 for name, t in times.items()}
+
+
+def _numbers(name: str) -> int:
+    return sum(3 if p.per_channel else 1 for p in parameters_of(MODELS[name][0]))
+
+
+def _bent(name: str, row: Row) -> bool:
+    """Whether a parameter that bends the lobe, not a colour at 0, lies at a bound of its search box."""
+    shapes = {p.name for p in parameters_of(MODELS[name][0]) if not p.linear}
+    return any(b.split("[")[0] in shapes for b in row["at_bound"])
+
+
+def ranking(c: Comparison) -> list[str]:
+    """The table of all models."""
+    lines = [
+        "| | model | " + " | ".join(LOSSES) + " | all | worst | numbers | at a bound | converged | fit, s | ns |",
+        "|---|---|" + "---|" * (len(LOSSES) + 7),
+    ]
+    for k, m in enumerate(c.ranked, 1):
+        mine = c.of(m)
+        typical = [f"{c.typical(m, loss):.2f}" for loss in LOSSES]
+        bent = sum(_bent(m, r) for r in mine) / len(mine)
+        converged = sum(r["converged"] for r in mine)
+        seconds = np.median([r["seconds"] for r in mine])
+        lines.append(
+            f"| {k} | `{m}` | {' | '.join(typical)} | **{c.typical(m):.2f}** | {np.nanmax(c.over_best(m)):.1f} | "
+            f"{_numbers(m)} | {bent:.0%} | {converged} of {len(mine)} | {seconds:.2f} | {c.cost.get(m, np.nan):.1f} |"
+        )
+    return lines
+
+
+def advice(c: Comparison, kind: str) -> list[str]:
+    """Which model to use for a kind of material, in words."""
+    loss = LOSSES[0]
+    members = [m for m in c.materials if KIND.get(m) == kind]
+    by_error = sorted(c.models, key=lambda m: c.typical(m, loss, kind))
+    best, *others = by_error
+    lead = c.typical(best, loss, kind)
+    close = [m for m in others if c.typical(m, loss, kind) <= CLOSE * lead]
+    cheap = [m for m in by_error if c.cost[m] < 0.7 * c.cost[best]]
+    words = [
+        f"**{kind[0].upper()}{kind[1:]}** ({len(members)}: {', '.join(members)}). "
+        f"Use `{best}`: its `{loss}` error is {lead:.2f} times the smallest of any model, on average, and it is the best "
+        f"of all on {c.wins(best, loss, kind)} of {len(members)}."
+    ]
+    if close:
+        words.append(
+            f"As good within {CLOSE - 1:.0%}: " + ", ".join(f"`{m}` ({c.typical(m, loss, kind):.2f})" for m in close) + "."
+        )
+    else:
+        words.append(f"Next is `{others[0]}` ({c.typical(others[0], loss, kind):.2f}).")
+    if cheap:
+        m = cheap[0]
+        words.append(
+            f"Of the models that cost less than 0.7 of its {c.cost[best]:.0f} ns, `{m}` ({c.cost[m]:.0f} ns) loses least: "
+            f"{c.typical(m, loss, kind):.2f}."
+        )
+    for other in LOSSES[1:]:
+        m = min(c.models, key=lambda m: c.typical(m, other, kind))
+        value, its = c.typical(m, other, kind), c.typical(best, other, kind)
+        leads = f"leads too ({value:.2f})" if m == best else f"leads ({value:.2f}; `{best}` {its:.2f})"
+        words.append(f"Fitted and judged under `{other}`, `{m}` {leads}.")
+    return [" ".join(words), ""]
+
+
+def heat_map(c: Comparison, path: Path) -> None:
+    """Error over the best of any model: models by rank, materials by kind, a panel a loss."""
+    rows = [c.models.index(m) for m in c.ranked]
+    edges = [i for i in range(1, len(c.materials)) if KIND.get(c.materials[i]) != KIND.get(c.materials[i - 1])]
+    with styled(grid=False):
+        figure, axes = new_figure(16, 9.2, (1.6, 0.95, 1.75, 0.55), 1, len(LOSSES), sharey=True)
+        figure.subplots_adjust(wspace=0.04)
+        for k, (ax, loss) in enumerate(zip(axes[0], LOSSES, strict=True)):
+            values = np.log2(c.ratio[rows, :, k])
+            image = ax.imshow(values, aspect="auto", cmap="viridis_r", vmin=0, vmax=4, interpolation="nearest")
+            for e in edges:
+                ax.axvline(e - 0.5, color="white", lw=1.6)
+            ax.set_title(f"fitted and judged under {loss}", pad=22)
+            starts = [0, *edges, len(c.materials)]
+            for a, b in pairwise(starts):
+                name = KIND.get(c.materials[a], "others").replace(" ", "\n", 1)
+                ax.text((a + b - 1) / 2, -0.9, name, ha="center", va="bottom", fontsize=7, color="#444444")
+            ax.set_xticks(range(len(c.materials)), c.materials, rotation=90, fontsize=6.5)
+            ax.tick_params(length=0)
+            best = np.argwhere(values <= 0)
+            ax.plot(best[:, 1], best[:, 0], "o", ms=2.2, color="#D55E00", lw=0)
+        axes[0, 0].set_yticks(range(len(rows)), c.ranked, fontsize=8)
+        box = axes[0, -1].get_position()
+        bar = figure.colorbar(image, cax=figure.add_axes((0.952, box.y0, 0.009, box.height)), extend="max")
+        bar.set_ticks(range(5), ["1", "2", "4", "8", "16"])
+        bar.set_label("error over that of the best model of the material (dots)")
+        bar.outline.set_linewidth(0.4)
+        figure.savefig(path, dpi=100)
+
+
+def pareto(c: Comparison, path: Path) -> None:
+    """Error over the best against the cost of evaluation, of all materials and of each kind."""
+    kinds = [None, *KINDS]
+    with styled():
+        figure, axes = new_figure(15, 8.4, (0.7, 0.15, 0.6, 0.35), 2, 4)
+        figure.subplots_adjust(wspace=0.18, hspace=0.24)
+        axes[1, 3].axis("off")
+        for ax, kind in zip(axes.ravel(), kinds, strict=False):
+            points = [(c.cost[m], c.typical(m, LOSSES[0], kind)) for m in c.models]
+            best = front(points)
+            x, y = np.array(points).T
+            ax.set_xscale("log")
+            ax.set_yscale("log")
+            ax.set_xlim(x.min() / 3.2, x.max() * 1.3)
+            ax.set_ylim(0.8, y.max() * 1.15)
+            ax.plot(x, y, "o", ms=4, mfc="white", mec="#8a8a8a", lw=0)
+            ax.plot(x[best], y[best], "o-", ms=5, color="#0072B2", lw=0.9, drawstyle="steps-post")
+            height = np.inf
+            for i in best:
+                at = ax.transData.transform(points[i])[1] * 72 / figure.dpi
+                drop = min(-6.0, height - 10.5 - at)
+                height = at + drop
+                ax.annotate(
+                    c.models[i], points[i], (-5, drop), textcoords="offset points", ha="right", va="center", fontsize=7
+                )
+            ax.set_title("all materials" if kind is None else kind)
+            ticks = [t for t in (1, 1.5, 2, 3, 5, 10, 20, 50) if t < y.max() * 1.15]
+            ax.set_yticks(ticks, [f"{t:g}" for t in ticks])
+            ax.yaxis.set_minor_locator(_none())
+        for ax in axes[:, 0]:
+            ax.set_ylabel(f"{LOSSES[0]} error over the best model's")
+        for ax in (*axes[1, :3], axes[0, 3]):
+            ax.set_xlabel("evaluation, ns for a pair of directions")
+        text = (
+            "Each point is a model; filled, on the line:\nno other model is both cheaper and better.\n\n"
+            "Error: geometric mean over the materials of\nthe error over the smallest of any model.\n\n"
+            "Cost: one core, float32, three channels,\ncompiled, 8,192 directions at a time."
+        )
+        axes[1, 3].text(0.05, 0.95, text, va="top", fontsize=9, color="#333333")
+        figure.savefig(path, dpi=100)
+
+
+def _none() -> Any:
+    from matplotlib.ticker import NullLocator
+
+    return NullLocator()
+
+
+def winners(c: Comparison) -> list[str]:
+    """The best model of each material."""
+    lines = ["| material | kind | " + " | ".join(LOSSES) + " |", "|---|---|" + "---|" * len(LOSSES)]
+    for i, t in enumerate(c.materials):
+        cells = []
+        for k in range(len(LOSSES)):
+            j = int(np.nanargmin(c.errors[:, i, k]))
+            cells.append(f"`{c.models[j]}` {c.errors[j, i, k]:.5f}")
+        lines.append(f"| {t} | {KIND.get(t, '')} | " + " | ".join(cells) + " |")
+    return lines
+
+
+def _checked(c: Comparison) -> str:
+    """How well the errors of the compressed table agree with those of all cells."""
+    off = {
+        (r["model"], r["material"], r["loss"]): abs(r["error"] / r["of_cells"][r["loss"]] - 1)
+        for r in c.rows
+        if r["of_cells"]
+    }
+    if not off:
+        return ""
+    values = np.array(list(off.values()))
+    worst = max(off, key=lambda key: off[key])
+    low, high = np.quantile(values, [0.5, 0.95])
+    return (
+        f"Of {len(values)} fits the error was also taken over all cells: the two differ by {low:.0e} in the median, "
+        f"{high:.0e} at the 95th percentile, {values.max():.1e} at worst (`{worst[0]}`, {worst[1]}, {worst[2]})."
+    )
+
+
+def table(rows: list[Row], path: Path) -> None:
+    """Every fit with its parameters, as CSV."""
+    with path.open("w", newline="", encoding="utf-8") as file:
+        out = csv.writer(file, lineterminator="\n")
+        out.writerow(["material", "model", "loss", "error", "converged", "seconds", "at_bound", "parameters"])
+        for r in sorted(rows, key=lambda r: (r["material"], r["model"], r["loss"])):
+            short = {n: np.vectorize(lambda v: float(f"{v:.6g}"))(v).tolist() for n, v in r["parameters"].items()}
+            numbers = json.dumps(short, separators=(",", ":"))
+            bounds = " ".join(r["at_bound"])
+            out.writerow(
+                [r["material"], r["model"], r["loss"], f"{r['error']:.7g}", r["converged"], r["seconds"], bounds, numbers]
+            )
+
+
+def write(out: Path, rows: list[Row], first: brdfit.Table, command: str, settings: str) -> None:
+    """The page, its two pictures and the table of all fits, side by side."""
+    c = Comparison(rows, costs(rows, first))
+    base = out.with_suffix("")
+    heat_map(c, base.with_name(base.name + "_errors.png"))
+    pareto(c, base.with_name(base.name + "_cost.png"))
+    table(rows, out.with_suffix(".csv"))
+    failed = [r for r in rows if not r["converged"]]
+    lines = [
+        "# Which model for which material",
+        "",
+        f"{len(c.models)} models x {len(c.materials)} materials x {len(LOSSES)} losses, {len(rows)} fits, made on "
+        f"{date.today().isoformat()} by",
+        f"`{command}`",
+        f"({os.cpu_count()} cores, {platform.machine()}). {settings} {_checked(c)}",
+        "",
+        "Each fit is judged under the loss that it was fitted with. `perceptual` ranks fits as people do, `log` is what a",
+        "fit minimises by default, and `ngan` compares the values themselves, so that peaks decide. Every fit, with its",
+        f"parameters, is in [{base.name}.csv]({base.name}.csv).",
+        "",
+        "## Which model to use",
+        "",
+        "These sentences are made from the numbers below. *On average* is the geometric mean, over the materials, of the",
+        "error over the smallest of any model on the same material.",
+        "",
+    ]
+    for kind in KINDS:
+        if any(KIND.get(m) == kind for m in c.materials):
+            lines += advice(c, kind)
+    lines += [
+        f"![Error over that of the best model, for each model, material and loss]({base.name}_errors.png)",
+        "",
+        "## All models, ranked",
+        "",
+        RANKS,
+        "",
+        *ranking(c),
+        "",
+        "`low_microfacet` is `abc` with another scale; `lambert`, `oren_nayar` and `oren_nayar_full` have no lobe and say",
+        "how much a lobe is worth.",
+        "",
+        "## Error against the cost of evaluation",
+        "",
+        f"![Error against evaluation cost, with the models that are worth their cost]({base.name}_cost.png)",
+        "",
+        "## The best model of each material",
+        "",
+        *winners(c),
+        "",
+    ]
+    if failed:
+        lines += [
+            "## Fits that did not converge",
+            "",
+            f"{len(failed)} of {len(rows)}: "
+            + "; ".join(f"{r['model']}, {r['material']}, {r['loss']}: {r['reason']}" for r in failed[:40])
+            + ("." if len(failed) <= 40 else f"; and {len(failed) - 40} more, in the CSV file."),
+            "",
+        ]
+    out.write_text("\n".join(lines), encoding="utf-8")
