@@ -55,7 +55,7 @@ class _Fold:
         rows = 1 if a.shape[0] == 1 else self.blocks[1]
         if a.shape[1:] == (1, 1):
             return on_device(np.pad(a.reshape(1, -1, 1), ((0, 0), (0, rows - a.shape[0]), (0, 0)), constant_values=fill))
-        out = np.full((self.blocks[0], rows, self.blocks[2]), fill, a.dtype)
+        out = aligned((self.blocks[0], rows, self.blocks[2]), a.dtype, fill)
         return on_device(self.fold(np.broadcast_to(a, (a.shape[0], *self.shape[1:])), out))
 
     def fold(self, a: np.ndarray, out: np.ndarray) -> np.ndarray:
@@ -64,6 +64,16 @@ class _Fold:
             part = a[:, at // self.steps[1] :: self.steps[0], at % self.steps[1] :: self.steps[1]]
             block.reshape(len(block), *self.banded[2:])[: len(a), : part.shape[1], : part.shape[2]] = part
         return out
+
+
+def aligned(shape: tuple[int, ...], dtype: Any = float, fill: float = 0.0) -> np.ndarray:
+    """An array that programs take as it is, without a copy: it begins at a multiple of 64 bytes."""
+    size = int(np.prod(shape)) * np.dtype(dtype).itemsize
+    raw = np.empty(size + 64, np.uint8)
+    begin = -raw.ctypes.data % 64
+    out = raw[begin : begin + size].view(dtype).reshape(shape)
+    out[...] = fill
+    return out
 
 
 def on_device(a: np.ndarray) -> Array:
@@ -126,7 +136,7 @@ def grid_samples(
     """Blocks of the fitted cells of a table."""
     rows = _rows(grid, limit, along_phi)
     weights = _weights(grid, limit, along_phi, measure, np.packbits(used).tobytes())
-    measured = np.zeros((rows.fold.blocks[0], table.channels, *rows.fold.blocks[1:]))
+    measured = aligned((rows.fold.blocks[0], table.channels, *rows.fold.blocks[1:]))
 
     def fold(c: int) -> None:
         rows.fold.fold(_values(table, used, rows, c), measured[:, c])
@@ -146,7 +156,7 @@ class _Compression:
 
     transforming: Geometry
     """Of the cells ``[H, D, P]``."""
-    weight: Reals
+    weight: Array
     """Weights of the loss ``[H, D, P]``."""
     rules: RowRules
     at_nodes: Geometry
@@ -167,11 +177,19 @@ def _compression(grid: HalfDifferenceGrid, limit: float, k: int, measure: str, f
     relative = loss.weight(at_nodes)
     node_weight = node_weight if relative is None else node_weight / np.asarray(relative)
     fold = _Fold(node_weight.shape, k)
-    return _Compression(g, weight, rules, at_nodes, fold, _folded(at_nodes, fold, limit), fold(node_weight))
+    return _Compression(
+        jax.tree.map(on_device, g),
+        on_device(weight),
+        rules,
+        at_nodes,
+        fold,
+        _folded(at_nodes, fold, limit),
+        fold(node_weight),
+    )
 
 
 @program
-def _transformed(loss: Loss, values: Array | Reals, g: Geometry, weight: Array | Reals) -> tuple[Array, Array]:
+def _transformed(loss: Loss, values: Array | Reals, g: Geometry, weight: Array) -> tuple[Array, Array]:
     """What the loss sees of the values ``[H, D, P]`` of a channel, and its weighted square sum."""
     transform: Transform = loss.transform
     seen = jnp.broadcast_to(transform(values, g), values.shape)
@@ -199,7 +217,7 @@ def compress(whole: Samples, table: Table, used: NDArray[np.bool_], max_angle: f
     limit = float(np.radians(max_angle))
     rows = _rows(grid, limit, k)
     how = _compression(grid, limit, k, measure, np.packbits(used).tobytes(), loss)
-    nodes = np.empty((how.fold.blocks[0], table.channels, *how.fold.blocks[1:]))
+    nodes = aligned((how.fold.blocks[0], table.channels, *how.fold.blocks[1:]))
 
     def channel(c: int) -> float:
         """Fills in a channel's nodes and returns what they leave out of its cost."""
@@ -209,7 +227,6 @@ def compress(whole: Samples, table: Table, used: NDArray[np.bool_], max_angle: f
         how.fold.fold(np.asarray(values), nodes[:, c])
         return max(float(total) - kept, 0.0)
 
-    nodes[:] = 0.0
     remainder = np.array(list(in_threads(channel, range(table.channels))))
     blocks = Blocks(how.geometry, on_device(nodes), how.node_weight)
     return Samples(whole.cells, whole.banded, whole.band_axes, blocks, on_device(remainder))
