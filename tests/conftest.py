@@ -3,6 +3,7 @@
 import importlib.util
 import os
 import shutil
+import sys
 import tempfile
 from pathlib import Path
 
@@ -22,6 +23,14 @@ def pytest_configure(config):
 def pytest_unconfigure(config):
     if hasattr(config, "programs"):
         shutil.rmtree(config.programs, ignore_errors=True)
+
+
+@pytest.fixture(autouse=True)
+def _not_stored():
+    """A command that a test runs stores programs; the next test may change what they are made of."""
+    yield
+    if "brdfit.stored_programs" in sys.modules:
+        sys.modules["brdfit.stored_programs"].store_in(None)
 
 
 @pytest.fixture(scope="session")
