@@ -35,6 +35,8 @@ class AshikhminShirley(BRDF):
     """f = 28 diffuse/(23 pi) (1 - specular)(1 - (1 - n.v/2)^5)(1 - (1 - n.l/2)^5)
     + (e + 1)/(8 pi) (n.h)^e F_schlick(specular, c_d) / (c_d max(n.l, n.v)) (Ashikhmin & Shirley 2000, eq. 4 and 5).
 
+    The survey's print of it (Schwenk 2011, eq. 41) has lost pi and the root over (e_x + 1)(e_y + 1). By integration the
+    paper's form returns what falls on it, or less.
     Reciprocal; conserves energy for diffuse, specular <= 1 (tests/test_energy.py::test_ashikhmin_shirley_conserves_energy).
     Known failure: on rough materials the best fit uses the lobe
     (exponent -> 0) as body term.

@@ -17,8 +17,9 @@ from .ndf.power_cosine import log_cosine
 class BlinnPhong(BRDF):
     """f = diffuse/pi + specular (e + 2)/(2 pi) (n.h)^e (Blinn 1977; in this scale Ngan et al. 2005).
 
-    The factor is the one of Phong's lobe; here it makes the albedo at normal incidence about 4 specular for large e. Blinn
-    divides by n.l, which is not reciprocal and is left out, as in the published fits.
+    The factor is the one of Phong's lobe; here it makes the albedo at normal incidence 4 (2^(-e/2) + e)/(e + 4)
+    specular, 4 times specular for large e (tests/test_energy.py::test_scales_by_integration). Blinn divides by n.l, which is
+    not reciprocal and is left out, as in the published fits.
     Reciprocal; does not conserve energy for diffuse + specular <= 1. No Fresnel term: darkens towards grazing.
     """
 

@@ -6,7 +6,9 @@ from .factory import named
 
 _COMMON = """
 
-    Divisor 4 in place of the pi of Cook & Torrance (1982), eq. 2; Schlick's Fresnel in place of theirs.
+    Divisor 4 in place of the pi of Cook & Torrance (1982), eq. 2; Schlick's Fresnel in place of theirs. The survey's prints of
+    the distributions (Schwenk 2011, eq. 36 to 38) have lost pi or leave the scale free: here each is normalised by
+    integration (tests/test_ndf.py::test_normalisation).
     Reciprocal. The albedo of the lobe is at most 1 for specular <= 1; that of the sum need not be. Has
     kinks where two of the three terms of G are equal.
 """
@@ -30,8 +32,7 @@ CookTorranceGaussian = named(
     "cook_torrance_gaussian",
     ("gaussian", "vcavity", "schlick", "lambert"),
     """f = diffuse/pi + F_schlick(specular, c_d) D G_vcavity / (4 n.l n.v), D = k exp(-theta_h^2/alpha^2) normalised
-    (Torrance
-    & Sparrow 1967; Blinn 1977; Schwenk 2011, eq. 35 and 36, where k is free)."""
+    (Torrance & Sparrow 1967; Blinn 1977; Schwenk 2011, eq. 35 and 36, where k is free)."""
     + _COMMON,
     ("cook1982",),
 )

@@ -18,7 +18,8 @@ class Phong(BRDF):
     """f = diffuse/pi + specular (e + 2)/(2 pi) (r.v)^e / n.l, r the mirror of l about n (Phong 1975; Schwenk 2011, eq. 24).
 
     Phong scales intensities, so that his lobe has no (e + 2)/(2 pi) and cancels the cosine of the light: that is the 1/n.l.
-    With the factor, that of :class:`ModifiedPhong`, the albedo of the lobe at normal incidence is specular.
+    With the factor, that of :class:`ModifiedPhong`, the albedo of the lobe at normal incidence is specular
+    (tests/test_energy.py::test_scales_by_integration).
     Not reciprocal. Does not conserve energy: the albedo grows as 1/n.l. No Fresnel term. Known failure: the lobe of a rough
     measured material is narrower across than along the plane of incidence at grazing, and this one is round.
     """

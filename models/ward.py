@@ -28,6 +28,9 @@ def specular_parameter() -> Any:
 class Ward(BRDF):
     """f = diffuse/pi + specular exp(-tan^2(theta_h)/alpha^2) / (4 pi alpha^2 sqrt(n.l n.v)) (Ward 1992, eq. 4).
 
+    The survey's prints of it (Schwenk 2011, eq. 43 and 44) have lost alpha, pi and the root over n.l n.v. By integration,
+    with all of them the albedo of the lobe at normal incidence tends to specular as alpha -> 0
+    (tests/test_energy.py::test_scales_by_integration).
     Reciprocal. Does not conserve energy: towards grazing the albedo of the lobe rises without bound as 0.0668
     specular/sqrt(n.l) at the worst alpha, 0.72. That exceeds specular beyond 89.73 degrees only, and is 7.15 specular at
     89.995 degrees; at 80 degrees no alpha gives more than 0.27 specular
