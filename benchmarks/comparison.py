@@ -53,24 +53,26 @@ def fitted(table: brdfit.Table, model: str, loss: str, check: bool) -> Row:
 
 
 def run(tables: list[Path], keep: Path) -> tuple[list[Row], float]:
-    """All fits, those that are missing made, and how long that took."""
+    """All fits, those that are missing made, and how long that took; those of costly models last."""
     rows = [json.loads(line) for line in keep.read_text(encoding="utf-8").splitlines()] if keep.exists() else []
     done = {(r["material"], r["model"], r["loss"]) for r in rows}
     begin = time.perf_counter()
     with ThreadPoolExecutor(os.cpu_count()) as pool, keep.open("a", encoding="utf-8") as file:
-        for k, path in enumerate(tables):
-            table = None
-            for loss in LOSSES:
-                missing = [m for m in MODELS if (path.stem, m, loss) not in done]
-                if not missing:
-                    continue
-                table = table or brdfit.load(path)
-                check = k % CHECKED == 0
-                for row in pool.map(lambda m, t=table, on=loss, c=check: fitted(t, m, on, c), missing):
-                    rows.append(row)
-                    file.write(json.dumps(row) + "\n")
-                file.flush()
-            print(f"{k + 1}/{len(tables)} {path.stem} {time.perf_counter() - begin:.0f} s", file=sys.stderr, flush=True)
+        for models in ([m for m in MODELS if m not in EFFORT], list(EFFORT)):
+            for k, path in enumerate(tables):
+                table = None
+                for loss in LOSSES:
+                    missing = [m for m in models if (path.stem, m, loss) not in done]
+                    if not missing:
+                        continue
+                    table = table or brdfit.load(path)
+                    check = k % CHECKED == 0
+                    for row in pool.map(lambda m, t=table, on=loss, c=check: fitted(t, m, on, c), missing):
+                        rows.append(row)
+                        file.write(json.dumps(row) + "\n")
+                    file.flush()
+                took = time.perf_counter() - begin
+                print(f"{k + 1}/{len(tables)} {path.stem} {took:.0f} s", file=sys.stderr, flush=True)
     return rows, time.perf_counter() - begin
 
 
