@@ -6,8 +6,8 @@ from .factory import named
 
 _COMMON = """
 
-    Divisor 4 in place of the pi of Cook & Torrance (1982), eq. 2; Schlick's Fresnel in place of theirs. The survey's prints of
-    the distributions (Schwenk 2011, eq. 36 to 38) have lost pi or leave the scale free: here each is normalised by
+    Divisor 4 in place of the pi of Cook & Torrance (1982), eq. 2; Schlick's Fresnel in place of theirs. The survey's prints
+    of the distributions (Schwenk 2011, eq. 36 to 38) have lost pi or leave the scale free: here each is normalised by
     integration (tests/test_ndf.py::test_normalisation).
     Reciprocal. The albedo of the lobe is at most 1 for specular <= 1; that of the sum need not be. Has
     kinks where two of the three terms of G are equal.
