@@ -53,9 +53,13 @@ def fitted(table: brdfit.Table, model: str, loss: str, check: bool) -> Row:
 
 
 def run(tables: list[Path], keep: Path) -> tuple[list[Row], float]:
-    """All fits, those that are missing made, and how long that took; those of costly models last."""
+    """All fits, those that are missing made, and how long that took.
+
+    Those of costly models come last, and tables in an order of which any first few are spread over all.
+    """
     rows = [json.loads(line) for line in keep.read_text(encoding="utf-8").splitlines()] if keep.exists() else []
     done = {(r["material"], r["model"], r["loss"]) for r in rows}
+    tables = [tables[i] for i in np.argsort(np.arange(len(tables)) * 0.618034 % 1)]
     begin = time.perf_counter()
     with ThreadPoolExecutor(os.cpu_count()) as pool, keep.open("a", encoding="utf-8") as file:
         for models in ([m for m in MODELS if m not in EFFORT], list(EFFORT)):

@@ -61,7 +61,7 @@ class Comparison:
         kinds = list(KINDS)
         known = {r["material"] for r in rows}
         self.materials = sorted(known, key=lambda m: (kinds.index(KIND[m]) if m in KIND else len(kinds), m))
-        self.models = list(MODELS)
+        self.models = [m for m in MODELS if any(r["model"] == m for r in rows)]
         at = {(r["model"], r["material"], r["loss"]): r["error"] for r in rows}
         self.errors = np.array(
             [[[at.get((m, t, e), np.nan) for e in LOSSES] for t in self.materials] for m in self.models], float
@@ -89,9 +89,10 @@ class Comparison:
 
 
 def costs(rows: list[Row], table: brdfit.Table) -> dict[str, float]:
-    """Nanoseconds of one core's time to evaluate each model in one pair of directions, three channels, float32."""
+    """Nanoseconds to evaluate each model, as it was fitted to some material, in one pair of directions of a table, three
+    channels, float32, on one core."""
     sample = draw(table, 80.0, "solid_angle")
-    fits = {r["model"]: r["parameters"] for r in rows if r["material"] == table.material and r["loss"] == LOSSES[0]}
+    fits = {r["model"]: r["parameters"] for r in reversed(rows) if r["loss"] == LOSSES[0]}
     calls = {name: Evaluation(direct, model(name, **p), sample) for name, p in fits.items()}
     times = interleaved(calls, REPEATS, 60.0)
     return {name: t.low / calls[name].count * 1e9 for name, t in times.items()}

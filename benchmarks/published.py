@@ -24,12 +24,14 @@ from pathlib import Path
 from typing import Any
 
 import brdfit
+import jax
 import numpy as np
 from brdfit.data import forms, preset, published_materials
 from brdfit.data.presets import STARTS, published_sgd_smith
 from brdfit.fitting.effort import Effort
 from brdfit.fitting.losses import LOSSES, Loss
 from brdfit.models import parameter_values, parameters_of
+from brdfit.tradeoff.sample import draw
 from search_only import search
 
 E1 = replace(LOSSES["ngan"], name="E1", source="low2012", weigh=LOSSES["low"].weigh)
@@ -40,6 +42,8 @@ MODEL = {form: name for name, form in STARTS.items()} | {
 }
 ROUNDING = 1e-6
 """Relative difference of errors that is no difference: searches end where a step lowers the cost by that share."""
+UNITS = 10 ** np.arange(-0.8, 0.81, 0.1)
+"""Factors on the lengths of He's model."""
 SAME = 1e-4
 """Relative difference of errors below which two starts led to one optimum."""
 
@@ -47,12 +51,17 @@ HOW = """\
 Each form is fitted anew under the loss of its publication, from automatic starts and from the published parameters.
 Errors are over all cells. The loss of the `ngan` forms is `ngan`; of Löw's forms it is `low`, and for those ending in
 E1 its weight with the residual of `ngan`; that of the `sgd` form has no name here: `log` is taken."""
+LENGTHS = """\
+The tables do not say in what the height and the correlation length are given; the preset takes them in wavelengths.
+If that were wrong, another unit would fit the materials better. Errors under `ngan` of the published fits with the
+lengths times a factor, geometric mean over the materials:"""
 COLUMNS = """\
 *As good*: materials on which the new fit's error is not above the published one's, by start. *New over published*:
 the better of the two, median and range over the materials. *Starts agree*: materials on which the two errors are the
 same to 1e-4; *automatic lower* and *published lower*, where they are not."""
 
 Row = dict[str, Any]
+Reals = np.ndarray
 
 
 def own_loss(form: str) -> Loss:
@@ -121,7 +130,27 @@ def _good(row: Row) -> dict[str, bool]:
     }
 
 
-def page(rows: list[Row], command: str) -> str:
+def lengths(tables: list[Path]) -> dict[str, Reals]:
+    """Error of the published fits of He's model with their lengths in other units, geometric mean over the materials: both
+    lengths times :data:`UNITS`, and either alone.
+    """
+    errors: dict[str, list[Reals]] = {"both": [], "sigma": [], "tau": []}
+    evaluate = jax.jit(lambda m, wi, wo: m(wi, wo))
+    with jax.enable_x64(True):
+        for path in tables:
+            if path.stem not in published_materials("ngan_he"):
+                continue
+            sample = draw(brdfit.load(path), 80.0, "solid_angle")
+            fit = parameter_values(preset("ngan_he", path.stem))
+            for which, found in errors.items():
+                scaled = ["sigma", "tau"] if which == "both" else [which]
+                models = [brdfit.model("htsg", **fit | {n: fit[n] * u for n in scaled}) for u in UNITS]
+                values = [np.asarray(evaluate(m, sample.wi, sample.wo)) for m in models]
+                found.append(np.array([sample.error(v, "ngan") for v in values]))
+    return {which: np.exp(np.mean(np.log(found), 0)) for which, found in errors.items()}
+
+
+def page(rows: list[Row], units: dict[str, Reals], command: str) -> str:
     """The page as Markdown."""
     materials = sorted({r["material"] for r in rows})
     pairs = len(rows)
@@ -160,6 +189,25 @@ def page(rows: list[Row], command: str) -> str:
         )
     lines += ["", "## Exceptions", ""]
     lines += [f"- {sentence}" for sentence in exceptions(missed)] or ["None."]
+    best = UNITS[int(np.argmin(units["both"]))]
+    lines += [
+        "",
+        "## The unit of length of `ngan_he`",
+        "",
+        LENGTHS,
+        "",
+        "| factor on | " + " | ".join(f"{u:.2g}" for u in UNITS) + " |",
+        "|---|" + "---|" * len(UNITS),
+        *(f"| {which} | " + " | ".join(f"{e:.4f}" for e in found) + " |" for which, found in units.items()),
+        "",
+        f"The smallest error with both lengths scaled is at {best:.2g}. "
+        + (
+            "So the unit is the wavelength: with micrometres (a factor of 1.8 at 0.55 micrometres) or the inverse of the wave "
+            "number (0.16) the published fits are worse."
+            if 0.75 < best < 1.34
+            else "That is not the wavelength, nor another unit that is known: it stays unsettled."
+        ),
+    ]
     lines += ["", "## Errors", "", "Published, then the new fit, each under the loss of its form.", ""]
     shown = [f for f in forms() if any(r["form"] == f for r in rows)]
     at = {(r["material"], r["form"]): r for r in rows}
@@ -197,7 +245,7 @@ def main() -> None:
     names = {p.stem for p in tables}
     every = f" --every {args.every}" if args.every > 1 else ""
     command = f"python benchmarks/published.py TABLES --keep published.jsonl --out docs/published.md{every}"
-    args.out.write_text(page([r for r in rows if r["material"] in names], command), encoding="utf-8")
+    args.out.write_text(page([r for r in rows if r["material"] in names], lengths(tables), command), encoding="utf-8")
     print(args.out)
 
 
