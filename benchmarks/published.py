@@ -202,8 +202,8 @@ def page(rows: list[Row], units: dict[str, Reals], command: str) -> str:
         "",
         f"The smallest error with both lengths scaled is at {best:.2g}. "
         + (
-            "So the unit is the wavelength: with micrometres (a factor of 1.8 at 0.55 micrometres) or the inverse of the wave "
-            "number (0.16) the published fits are worse."
+            "So the unit is the wavelength: with micrometres (a factor of 1.8 at 0.55 micrometres) or the inverse of the "
+            "wave number (0.16) the published fits are worse."
             if 0.75 < best < 1.34
             else "That is not the wavelength, nor another unit that is known: it stays unsettled."
         ),
