@@ -18,6 +18,7 @@ if TYPE_CHECKING:
     from .models import model as model
     from .models import parameter as parameter
     from .models.factory import microfacet as microfacet
+    from .scenes.ready import ready as ready
     from .tables import Table as Table
     from .tables import load as load
     from .tables import save as save
@@ -43,6 +44,7 @@ _PUBLIC = {
     "model": "models",
     "parameter": "models",
     "preset": "data",
+    "ready": "scenes.ready",
     "save": "tables",
 }
 

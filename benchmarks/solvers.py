@@ -35,6 +35,11 @@ from brdfit.fitting.search import Stage, solve
 from brdfit.fitting.solver import Box
 from brdfit.fitting.starts import starts
 from brdfit.models import evaluate_channels
+from brdfit.polar import PolarStencil
+from brdfit.programs import program
+
+LIMIT = float(np.radians(80))
+whole_pass = program(gram)
 
 
 def timed(run: Callable[[], Any]) -> tuple[float, Any]:
@@ -53,7 +58,11 @@ def dense(problem: Problem) -> tuple[Any, Any]:
     m = np.concatenate([np.asarray(b[1]).reshape(problem.channels, -1) for b in blocks], 1)
     w = np.concatenate([np.asarray(b[2]).ravel() for b in blocks])
     used = np.flatnonzero(w)
-    data = jax.tree.map(lambda leaf: leaf[used], g), jnp.asarray(m[:, used].T), jnp.sqrt(jnp.asarray(w[used]))
+    g = jax.tree.map(lambda leaf: leaf[used], g)
+    # Smith's integral from a table of polar angles, as the package has it: on every cell it would take forty gigabytes
+    stencils = (PolarStencil.of(np.asarray(c), LIMIT) for c in (g.cos_i, g.cos_o))
+    g = replace(g, **dict(zip(("stencil_i", "stencil_o"), stencils, strict=True)))
+    data = jax.tree.map(jnp.asarray, g), jnp.asarray(m[:, used].T), jnp.sqrt(jnp.asarray(w[used]))
 
     @jax.jit
     def residual(x, data):
@@ -123,12 +132,13 @@ def compare(table: brdfit.Table, name: str, repeats: int) -> dict[str, Any]:
         "exact": lambda: solve(problem, x0, box, exact),
         "solve": lambda: solve(problem, x0, box, fast),
         "data": data_pass,
-        "pass": lambda: gram(problem, x0, Span.cells(samples)),
+        "pass": lambda: whole_pass(problem, x0, Span.cells(samples)),
     }
-    model = jax.tree.map(jnp.asarray, fit.model)
-    bare = jax.jit(lambda m, g: evaluate_channels(m, g))
-    g = data[0]
-    pieces["bare"] = lambda: bare(model, g)
+    model = chart.cls(**{n: v[:channels] if v.ndim else v for n, v in fit.parameters.items()})
+    fast = brdfit.ready(model)
+    call, bare = jax.jit(lambda m, wi, wo: m(wi, wo)), jax.jit(evaluate_channels)
+    g, w = data[0], [jnp.asarray(v[ready.used]) for v in table.layout.directions()]
+    pieces |= {"call": lambda: call(fast, *w), "bare": lambda: bare(model, g)}
     times: dict[str, list[float]] = {k: [] for k in pieces}
     results = {}
     for repeat in range(repeats + 1):
@@ -138,10 +148,11 @@ def compare(table: brdfit.Table, name: str, repeats: int) -> dict[str, Any]:
                 times[key].append(seconds)
     out["every cell"] = times["exact"], cost(results["exact"].x)
     out["compressed"] = [a + b for a, b in zip(times["data"], times["solve"], strict=True)], cost(results["solve"].x)
-    out |= {key: times[key] for key in ("data", "solve", "pass", "bare")}
+    out |= {key: times[key] for key in ("data", "solve", "pass", "call", "bare")}
     return out
 
 
+PIECES = ("data", "solve", "pass", "call", "bare")
 WAYS = ("SciPy TRF, finite differences", "SciPy TRF, JAX Jacobian", "Optimistix LM as it comes", "every cell", "compressed")
 
 
@@ -169,20 +180,26 @@ def page(table: brdfit.Table, results: list[dict[str, Any]]) -> str:
         lines.append(f"| {r['model']} | {r['residuals']:,} | {r['coordinates']} | " + " | ".join(cells) + " |")
     lines += [
         "",
-        "Where the time goes, beside one bare evaluation of the fitted model in all channels on the fitted cells as",
-        "separate directions. A gram pass is residuals, Jacobian and normal equations over every cell.",
+        "Where the time goes, beside one evaluation of the fitted model on the fitted cells as separate directions: as",
+        "users call it, `ready(model)(wi, wo)`, and its formula alone, with cosines and positions in tables given. A gram",
+        "pass is residuals, Jacobian and normal equations over every cell, in one thread; evaluations take all cores.",
         "",
-        "| model | bare evaluation | data pass | solve | gram pass | SciPy/compressed | compressed/bare | gram pass/bare |",
-        "|---|---|---|---|---|---|---|---|",
+        "| model | data pass | solve | gram pass | `ready(model)(wi, wo)` | formula alone |",
+        "|---|---|---|---|---|---|",
+    ]
+    lines += [f"| {r['model']} | " + " | ".join(spread(r[k]) for k in PIECES) + " |" for r in results]
+    lines += [
+        "",
+        "| model | SciPy TRF / (data pass + solve) | SciPy TRF / solve | (data pass + solve) / `ready(model)(wi, wo)` | "
+        "gram pass / `ready(model)(wi, wo)` | (data pass + solve) / formula | gram pass / formula |",
+        "|---|---|---|---|---|---|---|",
     ]
     for r in results:
-        m = {k: statistics.median(r[k]) for k in ("bare", "data", "solve", "pass")}
-        total = statistics.median(r["compressed"][0])
-        lines.append(
-            f"| {r['model']} | "
-            + " | ".join(spread(r[k]) for k in ("bare", "data", "solve", "pass"))
-            + f" | {r[WAYS[0]][0][0] / total:.0f} | {total / m['bare']:.1f} | {m['pass'] / m['bare']:.2f} |"
-        )
+        m = {k: statistics.median(r[k]) for k in PIECES}
+        scipy_trf, total = r[WAYS[0]][0][0], statistics.median(r["compressed"][0])
+        ratios = [f"{scipy_trf / total:.0f}", f"{scipy_trf / m['solve']:.0f}"]
+        ratios += [f"{a / m[k]:.2g}" for k in ("call", "bare") for a in (total, m["pass"])]
+        lines.append(f"| {r['model']} | " + " | ".join(ratios) + " |")
     return "\n".join(lines) + "\n"
 
 
