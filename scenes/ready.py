@@ -34,7 +34,7 @@ class Ready(eqx.Module):
 def ready(brdf: Any) -> Any:
     """A model made ready for many directions, called as the model is: ``ready(model)(wi, wo)``.
 
-    Smith's integral is then read from a table, good to 1e-8, and a pair of directions takes a hundredth of the time (``gtr``,
+    Smith's integral is then read from a table, good to 1e-8; a pair of directions takes a hundredth of the time (``gtr``,
     ``sgd``). The model itself where it has no function of a polar angle worth a table (nothing is added to its program).
     """
     if not isinstance(brdf, BRDF):
