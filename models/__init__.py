@@ -16,7 +16,7 @@ from .blinn_phong import BlinnPhong
 from .cook_torrance import CookTorrance, CookTorranceBlinn, CookTorranceGaussian
 from .disney import Disney, DisneyAnisotropic
 from .distribution_based import DistributionBased
-from .effects import EFFECTS, compose
+from .effects import EFFECTS, compose, switchable
 from .epd import EPD
 from .factory import by_name
 from .ggx import GGX
@@ -85,13 +85,15 @@ MODELS: dict[str, tuple[type[BRDF], ...]] = {
 
 
 def variants(name: str) -> tuple[type[BRDF], ...]:
-    """The classes that go by a name: of :data:`MODELS`, effects joined by ``+`` (see :func:`compose`), or blocks of a
-    microfacet model (see :func:`brdfit.microfacet`).
+    """The classes that go by a name: of :data:`MODELS`, effects joined by ``+`` (see :func:`compose`), with switches or
+    without (see :func:`.effects.switchable`), or blocks of a microfacet model (see :func:`brdfit.microfacet`).
 
     Raises ValueError for any other name, and for effects that do not go together.
     """
     if name in MODELS:
         return MODELS[name]
+    if name.startswith("switchable("):
+        return (switchable(*name.removeprefix("switchable(").removesuffix(")").split("+")),)
     if "+" in name or name in EFFECTS:
         return (compose(*name.split("+")),)
     if name.startswith("microfacet("):

@@ -3,37 +3,52 @@
 from __future__ import annotations
 
 import os
-from collections.abc import Callable, Iterable, Sequence
+from collections.abc import Iterable, Sequence
 from concurrent.futures import ThreadPoolExecutor
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from functools import cached_property
 from typing import Protocol
-
-import numpy as np
 
 from ..models import BRDF
 from ..models.effects import EFFECTS, compose
 from ..tradeoff.evaluation import Operations
 from .scene import Tolerance
+from .screen import Fitted, own
 
 Effects = frozenset[str]
 
 STALLED = 0.02
 """Relative decrease of the error of a fit below which one more effect does not count as progress."""
-ALIKE = 0.05
-"""Relative difference of times that is not told from none: the model with fewer operations then counts as cheaper."""
-NEARLY = 0.01
-"""Relative difference of image errors within which, where no set meets the tolerance, the cheaper one is better."""
+ALIKE = 0.2
+"""Relative difference of times that is not told from none: the model with fewer operations then counts as cheaper. Other
+work on the machine moves the median of nine by as much."""
+PLAIN = ("body", "rough_body", "lobe", "fresnel", "masking", "trade_off")
+"""Effects that take few operations each: no exponential, no logarithm, no further lobe."""
+NEARLY = 0.02
+"""Relative difference of image errors within which, where no set meets the tolerance, a cheaper one is as good."""
+EXHAUSTED = 6
+"""Effects of a set of which all subsets that meet the tolerance are looked at; of larger sets only the best."""
+TIMED = 4
+"""Sets that compete for being the cheapest, at most: those with the fewest effects."""
 
 
 class Bench(Protocol):
     """Where models are tried: a scene and a table."""
 
-    def fit(self, effects: Effects, near: BRDF | None) -> tuple[BRDF, float]:
-        """The model of a set of effects under the scene's weight, and the error of that fit."""
+    def fit(self, effects: Effects, near: Sequence[Fitted]) -> Fitted:
+        """A set of effects under the scene's weight, from fits of other sets."""
 
-    def error(self, tried: Tried) -> float:
-        """Error of its picture."""
+    def alone(self, fitted: Fitted) -> Fitted:
+        """A fit once more, by the program of its own effects and no others."""
+
+    def extended(self, effects: Effects, fitted: Fitted) -> Fitted:
+        """A fit as one of more effects that do nothing."""
+
+    def seen(self, fitted: Fitted) -> float:
+        """Error of its picture, by the program of all effects and not of all pixels where there are many."""
+
+    def finished(self, fitted: Fitted) -> float:
+        """Error of the whole picture, by the program of its own effects and no others."""
 
     def costs(self, several: Sequence[Tried]) -> list[tuple[float, Operations]]:
         """Nanoseconds and operations for one pair of directions and all channels, in float32, timed in turns."""
@@ -43,21 +58,43 @@ class Bench(Protocol):
 class Tried:
     """A set of effects, fitted under the scene's weight; what else is known of it is found out when it is asked for."""
 
-    effects: tuple[str, ...]
-    model: BRDF
-    fit_error: float
-    """What the fit minimised (:class:`.quick_fit.Quick`)."""
+    fitted: Fitted
     bench: Bench
+
+    @property
+    def effects(self) -> tuple[str, ...]:
+        """Their names."""
+        return self.fitted.effects
 
     @property
     def label(self) -> str:
         """Names joined by +."""
         return " + ".join(self.effects)
 
+    @property
+    def fit_error(self) -> float:
+        """What the fit minimised (:class:`.screen.Fitted`)."""
+        return self.fitted.error
+
     @cached_property
+    def seen(self) -> float:
+        """Image error under the scene's tolerance, as the search sees it."""
+        return self.bench.seen(self.fitted)
+
+    @cached_property
+    def finished(self) -> float:
+        """Image error of the whole picture, as the model itself is rendered."""
+        return self.bench.finished(self.fitted)
+
+    @property
+    def model(self) -> BRDF:
+        """The model of these effects and no others."""
+        return own(self.fitted)
+
+    @property
     def error(self) -> float:
-        """Image error under the scene's tolerance."""
-        return self.bench.error(self)
+        """Image error: that of the whole picture if it is known."""
+        return self.finished if "finished" in vars(self) else self.seen
 
     @cached_property
     def costs(self) -> tuple[float, Operations]:
@@ -90,13 +127,14 @@ class Choice:
     """How a search went."""
 
     chosen: Tried
-    """The cheapest set that meets the tolerance, or the best one if none does."""
+    """The cheapest set that meets the tolerance, or one that is as good as can be if none does."""
     met: bool
     affordable: bool
     """Whether it is within the scene's budget."""
     ladder: tuple[Tried, ...]
-    """From one effect to the chosen set, one more each."""
+    """From one effect to the chosen set, one or more each."""
     everything: Tried
+    """The chosen set with all that can only improve it, or all effects if that is better: never worse than the chosen."""
     verdicts: tuple[Verdict, ...]
     tried: tuple[Tried, ...]
     """Every set that was fitted, by number of effects."""
@@ -130,87 +168,169 @@ def larger(effects: Effects, among: Iterable[str]) -> list[Effects]:
     return [s for n in among if n not in effects and possible(s := effects | {n})]
 
 
+class _Search:
+    """Sets that were fitted."""
+
+    def __init__(self, bench: Bench, tolerance: Tolerance, among: Sequence[str]) -> None:
+        self.bench, self.tolerance, self.among = bench, tolerance, among
+        self.known: dict[Effects, Tried] = {}
+        self.exhausted = EXHAUSTED
+        self.ratio = 1.0
+        """How much worse whole pictures were than what the search sees of them."""
+
+    def explore(self, sets: Iterable[Effects], *near: Tried) -> list[Tried]:
+        """Fit what was not fitted before, starting from other fits and from the best one of fewer effects."""
+        sets = list(dict.fromkeys(sets))
+        new = [s for s in sets if s not in self.known]
+
+        with ThreadPoolExecutor(os.cpu_count()) as pool:  # programs run outside Python's lock
+            fits = list(pool.map(lambda s: self.fit(s, *near), new))
+        self.known |= {s: Tried(f, self.bench) for s, f in zip(new, fits, strict=True)}
+        return [self.known[s] for s in sets]
+
+    def fit(self, effects: Effects, *near: Tried) -> Fitted:
+        within = [t for s, t in self.known.items() if s < effects]
+        best = sorted(within, key=lambda t: t.fit_error)[:1]
+        return self.bench.fit(effects, [t.fitted for t in dict.fromkeys([*near, *best])])
+
+    def good(self, tried: Tried) -> bool:
+        return self.tolerance.met(tried.error if "finished" in vars(tried) else tried.seen * self.ratio)
+
+    def top(self) -> Tried:
+        """A set that meets the tolerance, if there is one: the best one otherwise."""
+        here = self.upwards(self.among)
+        return here if self.good(here) else self.better(here, *self.explore([frozenset(self.among)], here))
+
+    def upwards(self, among: Sequence[str]) -> Tried:
+        """Effect by effect, that which lowers the error of the fit most, until the tolerance is met or nothing helps."""
+        among = [n for n in among if n in self.among]
+        here = min(self.explore(s for n in among if possible(s := frozenset([n]))), key=lambda t: t.fit_error)
+        while not self.good(here):
+            wider = self.explore(larger(frozenset(here.effects), among), here)
+            if not wider:
+                break
+            best = min(wider, key=lambda t: t.fit_error)
+            if best.fit_error > (1 - STALLED) * here.fit_error:
+                break
+            here = best
+        return here
+
+    def downwards(self, top: Tried) -> None:
+        """What can be left out of a set that meets the tolerance; of small sets in every order, of large ones in one."""
+        level = [top]
+        while level:
+            below: dict[Effects, Tried] = {}
+            for t in level:
+                for less in self.explore(smaller(frozenset(t.effects)), t):
+                    if self.good(less):
+                        below[frozenset(less.effects)] = less
+            level = list(below.values())
+            if level and max(len(t.effects) for t in level) > self.exhausted:
+                level = [min(level, key=lambda t: t.fit_error)]
+
+    def smallest(self) -> list[Tried]:
+        """The first few sets that meet the tolerance and of which nothing can be left out, as far as is known."""
+        good = [t for t in self.known.values() if "seen" in vars(t) and self.good(t)]
+        rest = [t for t in good if not any(set(o.effects) < set(t.effects) for o in good)]
+        return sorted(rest, key=lambda t: (len(t.effects), t.fit_error))[:TIMED]
+
+    def exchanged(self, t: Tried) -> list[Tried]:
+        """What also meets the tolerance with one effect exchanged for another."""
+        here = frozenset(t.effects)
+        sets = [s for less in smaller(here) for s in larger(less, self.among) if s != here and len(s) <= len(here)]
+        return [other for other in self.explore(sets, t) if self.good(other)]
+
+    def fastest(self) -> Tried | None:
+        """The cheapest of the smallest sets whose whole picture meets the tolerance; None if that of no set does."""
+        while rest := self.smallest():
+            _time(rest)
+            while rest:
+                t = _cheapest(rest)
+                _ = t.finished
+                if self.good(t):
+                    return t
+                rest.remove(t)
+                self.ratio = (min if self.tolerance.measure == "psnr" else max)(self.ratio, t.finished / t.seen)
+        return None
+
+    def alone(self, chosen: Tried) -> Tried:
+        """The chosen set fitted once more, by the program of its own effects, if that keeps what it is chosen for."""
+        again = Tried(self.bench.alone(chosen.fitted), self.bench)
+        _ = again.finished, chosen.finished
+        if self.good(chosen) and not self.good(again):
+            return chosen
+        self.known[frozenset(chosen.effects)] = again
+        return again
+
+    def better(self, *several: Tried) -> Tried:
+        """The one with the least image error."""
+        sign = -1 if self.tolerance.measure == "psnr" else 1
+        return min(several, key=lambda t: sign * t.error)
+
+    def settle_for(self, t: Tried) -> None:
+        """Ask for no more than what a set achieves, or nearly, and look along one path for less that does."""
+        more = -NEARLY if self.tolerance.measure == "psnr" else NEARLY
+        self.tolerance = replace(self.tolerance, limit=t.error * (1 + more))
+        self.exhausted = 0
+
+    def everything(self, chosen: Tried) -> Tried:
+        """All effects, or the chosen ones with all that can only add to them, whichever is better."""
+        nested = frozenset(chosen.effects)
+        for n in self.among:
+            if n not in nested and possible(nested | {n}) and EFFECTS[n].neutral(chosen.fitted.values, nested) is not None:
+                nested |= {n}
+        sets = list(dict.fromkeys((frozenset(self.among), nested)))
+        fits = [self.fit(s, chosen, *(t for t in [self.known.get(s)] if t)) for s in sets]
+        self.known |= {s: Tried(f, self.bench) for s, f in zip(sets, fits, strict=True)}
+        best = self.better(*(self.known[s] for s in sets))
+        _ = best.finished
+        if self.better(chosen, best) is best:
+            return best
+        # what is compared is not quite what was fitted: the chosen model is one of those, too, with all else at nothing
+        same = Tried(self.bench.extended(nested, chosen.fitted), self.bench)
+        _ = same.finished
+        return same
+
+
 def choose(bench: Bench, tolerance: Tolerance, budget: float | None, among: Sequence[str]) -> Choice:
-    """Search forward until the tolerance is met, then backward for what can be left out.
+    """Search forward until the tolerance is met, then backward for what can be left out, then sideways.
 
-    Forward, the effect whose addition lowers the error of the fit most is added; one that lowered its square by less before
-    than another does now is not fitted again. Where that stalls, everything is tried. Backward, the effect is dropped whose
-    loss leaves the cheapest model that still meets the tolerance. Of all sets met on the way that do, the cheapest is
-    chosen, and one that is within the budget, nanoseconds for one pair of directions, if there is one.
+    Forward, the effect whose addition lowers the error of the fit most is added. Where that stalls, everything is tried.
+    The same is done with effects that cost little alone (:data:`PLAIN`): a set of more of them may still be the faster one.
+    Backward, all that can be left out of the set is; sideways, each effect is exchanged for each other one. Of the sets
+    that remain, of which nothing can be left out, the fastest is chosen whose whole picture, rendered by its own program,
+    meets the tolerance. Where no set meets it, the same search is made for one that is as good as any. ``budget`` is in
+    nanoseconds for one pair of directions.
     """
-    known: dict[Effects, Tried] = {}
-
-    def explore(sets: Iterable[Effects], near: BRDF | None = None, pictures: bool = False) -> list[Tried]:
-        sets = list(sets)
-
-        def one(s: Effects) -> Tried:
-            tried = known[s] if s in known else Tried(compose(*s).effects, *bench.fit(s, near), bench)
-            if pictures:
-                _ = tried.error
-            return tried
-
-        with ThreadPoolExecutor(os.cpu_count()) as pool:  # programs are compiled and run outside Python's lock
-            known.update(zip(sets, pool.map(one, sets), strict=True))
-        return [known[s] for s in sets]
-
-    singles = [s for n in among if possible(s := frozenset([n]))]
-    here = min(explore(singles), key=lambda t: t.fit_error)
-    gains: dict[str, float] = {}
-    for _ in among:
-        if tolerance.met(here.error):
-            break
-        best = _step(here, among, gains, explore)
-        if best.fit_error > (1 - STALLED) * here.fit_error:
-            break
-        here = best
-    everything = explore([frozenset(among)], here.model, pictures=True)[0]
-    if not tolerance.met(here.error) and tolerance.met(everything.error):
-        here = everything
-    for _ in among:
-        less = explore(smaller(frozenset(here.effects)), here.model, pictures=True)
-        good = [t for t in less if tolerance.met(t.error)]
-        if not good:
-            break
-        here = _cheapest(good)
-    seen = [t for t in known.values() if "error" in vars(t)]
-    good = [t for t in seen if tolerance.met(t.error)]
-    if good:
-        _time(good)
-        fine = [t for t in good if budget is None or t.nanoseconds <= budget]
-        chosen = _cheapest(fine or good)
-    else:
-        sign = -1 if tolerance.measure == "psnr" else 1
-        least = min(sign * t.error for t in seen)
-        chosen = _cheapest([t for t in seen if sign * t.error <= least + NEARLY * abs(least)])
-    here_set = frozenset(chosen.effects)
-    explore([*smaller(here_set), *larger(here_set, among)], chosen.model, pictures=True)
-    ladder = _ladder(chosen, known)
-    explore([frozenset(t.effects) for t in (*ladder, everything)], pictures=True)
-    _time([t for t in known.values() if "error" in vars(t)])
+    search = _Search(bench, tolerance, among)
+    found = None
+    while found is None and search.good(top := search.top()):
+        search.downwards(top)
+        if search.good(plain := search.upwards(PLAIN)):
+            search.downwards(plain)
+        for t in search.smallest():
+            for other in search.exchanged(t):
+                search.downwards(other)
+        found = search.fastest()
+    if found is None:
+        search.settle_for(top)
+        search.downwards(top)
+        found = search.better(*search.smallest())
+    chosen = search.alone(found)
+    here = frozenset(chosen.effects)
+    search.explore([*smaller(here), *larger(here, among)], chosen)
+    everything = search.everything(chosen)
+    ladder = _ladder(chosen, search.known)
+    _time(list({id(t): t for t in (chosen, everything, *ladder)}.values()))
     return Choice(
         chosen,
-        bool(good),
+        tolerance.met(chosen.error),
         budget is None or chosen.nanoseconds <= budget,
         ladder,
         everything,
-        tuple(_verdict(name, chosen, known) for name in among),
-        tuple(sorted(known.values(), key=lambda t: (len(t.effects), t.fit_error))),
+        tuple(_verdict(name, chosen, search.known) for name in among),
+        tuple(sorted(search.known.values(), key=lambda t: (len(t.effects), t.fit_error))),
     )
-
-
-def _step(here: Tried, among: Iterable[str], gains: dict[str, float], explore: Callable[..., list[Tried]]) -> Tried:
-    """The best set with one effect more, or the given one; what each effect gained is kept in ``gains``."""
-    best, at_once = here, os.cpu_count() or 1
-    wider = {n: s for n in among for s in larger(frozenset(here.effects), [n])}
-    order = sorted(wider, key=lambda n: -gains.get(n, np.inf))
-    for k in range(0, len(order), at_once):
-        names = order[k : k + at_once]
-        # an effect seldom gains more beside others than without them
-        names = [n for n in names if gains.get(n, np.inf) > here.fit_error**2 - best.fit_error**2]
-        for n, t in zip(names, explore([wider[n] for n in names], here.model), strict=True):
-            gains[n] = here.fit_error**2 - t.fit_error**2
-            best = min(best, t, key=lambda t: t.fit_error)
-    return best
 
 
 def _time(several: Sequence[Tried]) -> None:
@@ -221,7 +341,6 @@ def _time(several: Sequence[Tried]) -> None:
 
 def _cheapest(several: Sequence[Tried]) -> Tried:
     """The model that takes the least time; of those that are :data:`ALIKE`, that with the fewest operations."""
-    _time(several)
     least = min(t.nanoseconds for t in several)
     alike = [t for t in several if t.nanoseconds <= (1 + ALIKE) * least]
     return min(alike, key=lambda t: (t.operations.flops + t.operations.transcendentals, len(t.effects)))
@@ -242,4 +361,4 @@ def _ladder(chosen: Tried, known: dict[Effects, Tried]) -> tuple[Tried, ...]:
     return tuple(reversed(rungs))
 
 
-__all__ = ["Choice", "Tried", "Verdict", "choose", "larger", "possible", "smaller", "without"]
+__all__ = ["Bench", "Choice", "Tried", "Verdict", "choose", "larger", "possible", "smaller", "without"]

@@ -11,6 +11,7 @@ from typing import Any
 import equinox as eqx
 import numpy as np
 from jaxtyping import Array, Float
+from numpy.typing import NDArray
 
 from ..polar import PolarStencil
 from ..reports.physics import FINE, hemisphere
@@ -85,6 +86,22 @@ class Illumination(eqx.Module):
     punctual: tuple[Punctual, ...]
     everywhere: Everywhere | None
     extended: Extended | None
+
+    def part(self, pixels: NDArray[np.intp]) -> Illumination:
+        """The light on some of the pixels."""
+        extended, everywhere = self.extended, self.everywhere
+        if extended is not None:
+            balls = tuple(Ball(b.axis[pixels], b.vers[pixels], b.radiance) for b in extended.balls)
+            sky = extended.sky
+            if sky is not None:
+                sky = Sky(sky.radiance, sky.density, sky.rows, sky.columns, sky.frame[pixels])
+            extended = Extended(balls, sky, extended.constant)
+        if everywhere is not None:
+            at = everywhere.stencil
+            at = PolarStencil(at.index[pixels], at.fraction[pixels], at.max_angle)
+            everywhere = Everywhere(everywhere.radiance, everywhere.wi, everywhere.wo, everywhere.weight, at)
+        punctual = tuple(Punctual(p.wi[pixels], p.arriving[pixels]) for p in self.punctual)
+        return Illumination(self.wo[pixels], punctual, everywhere, extended)
 
 
 def illuminate(scene: Scene, view: View, channels: int = 3, isotropic: bool = True) -> Illumination:

@@ -9,6 +9,7 @@ from jaxtyping import Array, ArrayLike, Float
 from numpy.typing import NDArray
 
 from ..errors import InputError
+from ..programs import program
 from ..tables import HalfDifferenceGrid, Table
 
 Reals = NDArray[np.float64]
@@ -44,6 +45,12 @@ class Measured(eqx.Module):
             i, j, k = (low + side for side, (low, _) in zip(corner, axes, strict=True))
             total = total + weight[..., None] * self.values[i, j, k]
         return jnp.where(above[..., None], total, 0)
+
+
+@program
+def evaluated(table: Measured, wi: Array, wo: Array) -> Array:
+    """The table at many directions, ``[..., C]``."""
+    return table(wi, wo)
 
 
 def half_difference(wi: Float[Array, "... 3"], wo: Float[Array, "... 3"]) -> tuple[Array, Array, Array]:

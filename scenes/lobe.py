@@ -2,19 +2,18 @@
 
 from __future__ import annotations
 
-from typing import Any
-
 import jax
 import numpy as np
 
 from ..angles import directions
+from .interpolated import Measured, evaluated
 from .rendering import cast
 
 THETA_D = np.radians(20)
 NARROWEST, WIDEST = 0.002, 1.0
 
 
-def lobe_alpha(brdf: Any) -> float:
+def lobe_alpha(table: Measured) -> float:
     """alpha of the GGX lobe of the same half-width, from :data:`NARROWEST` to :data:`WIDEST`.
 
     The half-width is the first theta_h, at theta_d = 20 degrees and phi_d = 90, at which the mean of the channels has
@@ -23,8 +22,7 @@ def lobe_alpha(brdf: Any) -> float:
     theta = np.concatenate([[0.0], np.geomspace(1e-4, np.radians(60), 400)])
     wi, wo = directions(theta, THETA_D, np.pi / 2)
     with jax.enable_x64(True):
-        what, wi, wo = cast((brdf, wi, wo), "float64")
-        values = np.asarray(jax.jit(lambda f, i, o: f(i, o))(what, wi, wo), float).mean(-1)
+        values = np.asarray(evaluated(*cast((table, wi, wo), "float64")), float).mean(-1)
     half = (values[0] + values[-1]) / 2
     below = np.flatnonzero(values <= half)
     if values[0] <= values[-1] or len(below) == 0:

@@ -24,7 +24,6 @@ from .survey import Study
 PAGE, NUMBERS, PICTURES = "scene.html", "scene.json", "scene.exr"
 WHY_LEFT_OUT = {
     "interreflection": "its fit would take longer than all the rest of the search",
-    "dispersion": "its fit would take longer than all the rest of the search",
     "anisotropy": "the table is isotropic",
 }
 TOP = 10.0
@@ -69,7 +68,7 @@ def document(study: Study, where: dict[str, Any]) -> dict[str, Any]:
         "summary": summary(study),
         "chosen": _record(study, choice.chosen, "chosen"),
         "everything": _record(study, choice.everything, "everything"),
-        "ladder": [_brief(t) for t in choice.ladder],
+        "ladder": [_timed(t) for t in choice.ladder],
         "effects": [
             {"effect": v.effect, "called_for": v.called, "because": because(study, v), "other": v.other and _brief(v.other)}
             for v in choice.verdicts
@@ -87,14 +86,16 @@ def _record(study: Study, t: Tried, key: str) -> dict[str, Any]:
     values = study.pictures[key].values
     errors = {m: _number(difference(m, values, study.reference.values, study.exposure, study.view)) for m in MEASURES}
     named = {n: v.tolist() for n, v in parameter_values(t.model).items()}
-    return _brief(t) | {"errors": errors, "model": t.model.name, "parameters": named}
+    return _timed(t) | {"errors": errors, "model": t.model.name, "parameters": named}
 
 
 def _brief(t: Tried) -> dict[str, Any]:
+    return {"effects": list(t.effects), "error": _number(t.error)}
+
+
+def _timed(t: Tried) -> dict[str, Any]:
     work = t.operations
-    return {
-        "effects": list(t.effects),
-        "error": _number(t.error),
+    return _brief(t) | {
         "nanoseconds": t.nanoseconds,
         "flops": _number(work.flops),
         "transcendentals": _number(work.transcendentals),
@@ -149,7 +150,7 @@ def missing(study: Study) -> str:
 
 def because(study: Study, v: Verdict) -> str:
     """Why a scene calls for an effect or does not, with figures."""
-    limit, chosen, other = study.scene.tolerance, study.choice.chosen, v.other
+    chosen, other = study.choice.chosen, v.other
     here = significant(chosen.error)
     if other is None:
         return "no model is left without it" if v.called else _untried(study, v.effect)
@@ -157,12 +158,8 @@ def because(study: Study, v: Verdict) -> str:
     if v.called:
         gone = [n for n in chosen.effects if n not in other.effects and n != v.effect]
         so = f" (nor {listed(_plain(n) for n in gone)}, which need it)" if gone else ""
-        if limit.met(other.error):
-            return f"without it{so} the error is {there}, within the tolerance too, but the model costs more"
         return f"without it{so} the error is {there}, not {here}"
-    more = other.nanoseconds - chosen.nanoseconds
-    cost = f"{significant(abs(more), 2)} ns {'more' if more > 0 else 'less'} a direction"
-    return f"with it the error is {there}, not {here}, at {cost}"
+    return f"with it the error is {there}, not {here}"
 
 
 def _untried(study: Study, effect: str) -> str:
@@ -202,7 +199,6 @@ def _context(study: Study, where: dict[str, Any]) -> dict[str, Any]:
         figures = f"RMS {significant(np.sqrt((off**2).mean()))}, largest {significant(off.max())}"
         differences.append({"title": parts[key], "image": difference_map(view, off, TOP), "caption": figures})
     cells = study.seen.cells(study.grid)
-    known = [t for t in choice.tried if "error" in vars(t) and t not in choice.ladder]
     noise = study.reference.noise
     return {
         "material": study.table.material,
@@ -218,7 +214,7 @@ def _context(study: Study, where: dict[str, Any]) -> dict[str, Any]:
         "differences": differences,
         "scale": scale(),
         "top": f"{TOP:g}",
-        "ladder": ladder(choice.ladder, known, limit, "Image error over the cost of the model"),
+        "ladder": ladder(choice.ladder, choice.everything, limit, "Image error over the cost of the model"),
         "rungs": [_row(t, choice.ladder[k - 1].effects if k else ()) for k, t in enumerate(choice.ladder)]
         + [_row(choice.everything, None)],
         "called": [_said(study, v) for v in choice.verdicts if v.called],

@@ -40,15 +40,17 @@ def scale() -> str:
     return _png(np.broadcast_to(colormaps["magma_r"](np.linspace(0, 1, 256))[None, :, :3], (12, 256, 3)))
 
 
-def ladder(rungs: Sequence[Tried], others: Sequence[Tried], tolerance: Tolerance, alt: str) -> str:
+def ladder(rungs: Sequence[Tried], everything: Tried, tolerance: Tolerance, alt: str) -> str:
     """Image error over the time of one evaluation, effect after effect. SVG text."""
     with styled("scene-ladder"):
         figure, axes = new_figure(7.4, 3.6, (0.7, 0.2, 0.5, 0.15))
         ax = axes[0, 0]
         ax.set_yscale("log" if tolerance.measure != "psnr" else "linear")
         ax.set_xscale("log")
-        for t in others:
-            ax.plot(t.nanoseconds, t.error, "o", ms=4, mfc="white", mec="#999999", mew=0.8)
+        if everything not in rungs:
+            point = everything.nanoseconds, everything.error
+            ax.plot(*point, "o", ms=4, mfc="white", mec="#999999", mew=0.8)
+            ax.annotate("everything", point, xytext=(6, 5), textcoords="offset points", color="#666666")
         x, y = [t.nanoseconds for t in rungs], [t.error for t in rungs]
         ax.plot(x, y, "-o", color="#0072B2", ms=5.5, lw=1)
         before: set[str] = set()
@@ -59,11 +61,6 @@ def ladder(rungs: Sequence[Tried], others: Sequence[Tried], tolerance: Tolerance
             ax.annotate(text.replace("_", " "), (t.nanoseconds, t.error), xytext=(7, 5), textcoords="offset points")
         last = rungs[-1]
         ax.plot(last.nanoseconds, last.error, "o", ms=10, mfc="none", mec="#0072B2")
-        for t in others:
-            if len(t.effects) == max(len(o.effects) for o in others):
-                ax.annotate(
-                    "everything", (t.nanoseconds, t.error), xytext=(6, 5), textcoords="offset points", color="#666666"
-                )
         ax.axhline(tolerance.limit, color="#555555", lw=0.8, ls=(0, (2, 2)))
         ax.annotate("tolerance", (1, tolerance.limit), xycoords=("axes fraction", "data"), xytext=(-2, 3),
                     textcoords="offset points", ha="right", color="#555555")  # fmt: skip

@@ -19,7 +19,7 @@ from ..reports.colours import luminance
 from ..tables import HalfDifferenceGrid
 from .difference import WHITE
 from .illumination import Extended, Illumination
-from .interpolated import Measured
+from .interpolated import Measured, evaluated
 from .rendering import Rendered, cast
 from .sampling import drawn, techniques_of
 from .scene import Reals
@@ -42,8 +42,10 @@ class Seen:
     """BRDF of the table, ``[n, C]``."""
     pixel: Reals
     """Radiance of the pixel that each is part of, times the exposure, ``[n, C]``."""
+    share: Reals
+    """Part of the luminance of the pixel that comes this way, over the number of pixels, ``[n]``; sums to 1."""
     weight: Reals
-    """``[n]``, sums to 1."""
+    """That times how much a relative change of the pixel is seen, squared, ``[n]``; sums to 1."""
 
     def cells(self, grid: HalfDifferenceGrid) -> Reals:
         """The weights summed over the cells of an isotropic grid, ``[H, D, P]``."""
@@ -62,12 +64,13 @@ class Seen:
         return out
 
     def draw(self, count: int) -> Seen:
-        """So many pairs of equal weight, one of each equal step of the summed weight in the order of theta_h."""
+        """So many pairs of equal share, one of each equal step of the summed share in the order of theta_h."""
         order = np.argsort(half_difference(self.wi, self.wo)[0], kind="stable")
-        steps = np.cumsum(self.weight[order])
+        steps = np.cumsum(self.share[order])
         chosen = order[np.minimum(np.searchsorted(steps, (np.arange(count) + 0.5) / count * steps[-1]), len(order) - 1)]
-        even = np.full(count, 1 / count)
-        return Seen(self.wi[chosen], self.wo[chosen], self.measured[chosen], self.pixel[chosen], even)
+        weight = self.weight[chosen] / self.share[chosen]
+        parts = (self.wi[chosen], self.wo[chosen], self.measured[chosen], self.pixel[chosen])
+        return Seen(*parts, np.full(count, 1 / count), weight / weight.sum())
 
 
 def seen(table: Measured, light: Illumination, picture: Rendered, exposure: float, alpha: float) -> Seen:
@@ -81,7 +84,9 @@ def seen(table: Measured, light: Illumination, picture: Rendered, exposure: floa
         others = Extended((), None, None) if extended is None else extended
         extended = Extended(others.balls, others.sky, light.everywhere.radiance)
     if extended is not None:
-        some, part = _fewer(extended, light.wo, every, rng)
+        count = min(len(every), max(LARGEST // (ROUNDS * techniques_of(extended)), 1))
+        part = np.sort(rng.choice(every, count, replace=False))
+        some = Illumination(light.wo, (), None, extended).part(part).extended
         for _ in range(ROUNDS):
             with jax.enable_x64(True):
                 u = rng.random((techniques_of(extended), 2, len(part)))
@@ -91,30 +96,14 @@ def seen(table: Measured, light: Illumination, picture: Rendered, exposure: floa
     wi, wo, arriving = (np.concatenate([r[k] for r in rows]) for k in range(3))
     at = np.concatenate([r[3] for r in rows])
     with jax.enable_x64(True):
-        values = np.asarray(jax.jit(lambda m, i, o: m(i, o))(*cast((table, wi, wo), "float64")), float)
+        values = np.asarray(evaluated(*cast((table, wi, wo), "float64")), float)
     pixel = picture.values * exposure
     brightness = luminance(pixel)
     share = luminance(values * arriving) * exposure / np.maximum(brightness[at], 1e-12)
     weight = share * visibility(brightness)[at] ** 2
     kept = weight > 0
-    total = weight.sum()
-    return Seen(wi[kept], wo[kept], values[kept], pixel[at][kept], weight[kept] / (total if total > 0 else 1.0))
-
-
-def _fewer(light: Extended, wo: Any, every: NDArray[np.intp], rng: np.random.Generator) -> tuple[Extended, NDArray[np.intp]]:
-    """The light on a random part of the pixels, so that no more than :data:`LARGEST` pairs are made."""
-    count = min(len(every), max(LARGEST // (ROUNDS * techniques_of(light)), 1))
-    part = np.sort(rng.choice(every, count, replace=False))
-
-    def of(leaf: Any) -> Any:
-        leaf = np.asarray(leaf)
-        return leaf[part] if leaf.ndim and leaf.shape[0] == len(every) else leaf
-
-    balls = tuple(jax.tree.map(of, b) for b in light.balls)
-    if light.sky is None:
-        return Extended(balls, None, light.constant), part
-    s = light.sky
-    return Extended(balls, type(s)(s.radiance, s.density, s.rows, s.columns, of(s.frame)), light.constant), part
+    even, counted = (x[kept] / (x[kept].sum() or 1.0) for x in (share, weight))
+    return Seen(wi[kept], wo[kept], values[kept], pixel[at][kept], even, counted)
 
 
 M1, M2 = 2610 / 16384, 2523 / 4096 * 128

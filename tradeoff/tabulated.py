@@ -15,6 +15,7 @@ from ..geometry import Geometry, from_directions
 from ..models import BRDF, parameters_of
 from ..models.base import channel_axes, channels
 from ..polar import INTERVALS, PolarStencil, PolarTables
+from ..programs import program
 
 
 class Tabulated(NamedTuple):
@@ -28,19 +29,23 @@ class Tabulated(NamedTuple):
 def tabulate(model: BRDF, max_angle: float) -> Tabulated:
     """Make the tables of polar functions that a model asks for, in float64; ``max_angle`` in degrees."""
     with jax.enable_x64(True):
-        limit = float(np.radians(max_angle))
-        at = PolarStencil.of(np.ones(1), limit)
-        one = jnp.ones(1)
-        g = Geometry(one, one, one, 0 * one, one, 0 * one, 0 * one, 0 * one, at, at)
-
-        def make(m: BRDF) -> list[Array]:
-            tables = PolarTables()
-            m.evaluate(replace(g, tables=tables))
-            return tables.made
-
-        first = jax.tree.map(jnp.asarray, model)
-        made = jax.jit(jax.vmap(make, in_axes=(channel_axes(model),), axis_size=channels(model)))(first)
+        made = _tables(jax.tree.map(np.asarray, model), float(np.radians(max_angle)))
         return Tabulated(model, made if _own_lobes(model) else [t[0] for t in made])
+
+
+@program
+def _tables(model: BRDF, limit: float) -> list[Array]:
+    at = PolarStencil.of(np.ones(1), limit)
+    one = jnp.ones(1)
+    g = Geometry(one, one, one, 0 * one, one, 0 * one, 0 * one, 0 * one, at, at)
+
+    def make(m: BRDF) -> list[Array]:
+        tables = PolarTables()
+        m.evaluate(replace(g, tables=tables))
+        return tables.made
+
+    made: list[Array] = jax.vmap(make, in_axes=(channel_axes(model),), axis_size=channels(model))(model)
+    return made
 
 
 def from_table(max_angle: float) -> Callable[[Tabulated, Array, Array], Array]:

@@ -111,7 +111,7 @@ def _composed(names: tuple[str, ...], switched: tuple[str, ...] = ()) -> type[Co
     for name in switched:
         parameters[SWITCH + name] = Parameter("", f"1 with {name}, 0 without", "1", Interval(0, 1), (0, 1), 1.0)
     cls = assemble(
-        "+".join(names) + (" with switches" if switched else ""),
+        f"switchable({'+'.join(names)})" if switched else "+".join(names),
         parameters,
         Composition.evaluate,
         doc="; ".join(EFFECTS[name].meaning for name in names) + ".",

@@ -19,7 +19,8 @@ def _add(parts: Parts, effects: Present) -> Parts:
     albedo = parts.albedo
 
     def left(m: Any, g: Geometry) -> Float[Array, "..."]:
-        return albedo(m, g) * (1 - m.specular)
+        rest: Float[Array, "..."] = albedo(m, g) * (1 - m.specular)
+        return rest
 
     def left_by_rise(m: Any, g: Geometry) -> Float[Array, "..."]:
         return ashikhmin_shirley_albedo(albedo(m, g), m.specular, g)

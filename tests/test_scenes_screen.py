@@ -1,0 +1,102 @@
+"""Fits of many sets of effects by one program, against the models that these sets are."""
+
+from types import SimpleNamespace
+
+import brdfit
+import jax
+import numpy as np
+import pytest
+from brdfit.fitting.starts import summarise
+from brdfit.models import parameter_values, parameters_of
+from brdfit.models.effects import EFFECTS, in_order
+from brdfit.scenes.appearance import look
+from brdfit.scenes.pairs import shown
+from brdfit.scenes.scene import Ambient, Camera, Directional, Scene, Sphere
+from brdfit.scenes.screen import Fitted, Screen, alone, own
+
+from .cases import WI, WO
+from .test_effects import truth_of
+
+AMONG = [n for n in EFFECTS if n not in ("anisotropy", "interreflection")]
+SETS = (
+    "body",
+    "diffraction+fresnel",
+    "body+rough_body+retro",
+    "body+lobe+trade_off",
+    "body+lobe+second_lobe+masking",
+    "body+lobe+fresnel+masking+trade_off",
+    "lobe+tail+dispersion+second_lobe+diffraction+fresnel",
+)
+
+
+def test_a_set_is_the_whole_model_with_the_rest_left_out():
+    """To the rounding of GTR against GGX and of the sums."""
+    screen = Screen(AMONG, SimpleNamespace(scale=np.zeros((1, 3))), None)
+    whole = jax.jit(lambda m: m(WI, WO))
+    for name in SETS:
+        names = in_order(name.split("+"))
+        values = {k: np.asarray(v, float) for k, v in truth_of("+".join(names)).items()}
+        fitted = screen.extended(names, Fitted(names, screen._whole(names, values), 0.0))
+        model = own(fitted)
+        assert model.effects == names
+        with jax.enable_x64(True):
+            np.testing.assert_allclose(whole(screen.model(fitted)), model(WI, WO), rtol=1e-9, atol=1e-300, err_msg=name)
+
+
+@pytest.fixture(scope="module")
+def scene(small_table):
+    """A screen of four effects, two lights, a small table; and what it is made of."""
+    lights = (Directional((0.3, 0.4, 1.0), (3.0,) * 3), Ambient((0.7,) * 3))
+    here = look(small_table[0], Scene("", Sphere(), Camera(pixels=(24, 24)), lights))
+    data, summary = shown(here), summarise(here.table, here.table.mask)
+    return Screen(("body", "lobe", "second_lobe", "masking"), data, summary), data, summary
+
+
+def test_slopes(scene):
+    """Cost and gradient from the factor: the sum of squared residuals of the model itself, and its differences."""
+    screen, data, _ = scene
+    names = ("body", "lobe", "second_lobe", "masking")
+    values = {
+        "diffuse": [0.2, 0.1, 0.3],
+        "specular": [0.1, 0.2, 0.3],
+        "alpha": 0.2,
+        "share": [0.2, 0.4, 0.6],
+        "alpha_2": 0.5,
+    }
+    x = screen._vector(screen._whole(names, {k: np.asarray(v) for k, v in values.items()}))
+
+    def cost(x):
+        factor = screen.linear(x)
+        return float(factor[:, -1] @ factor[:, -1])
+
+    with jax.enable_x64(True):
+        model = brdfit.model("+".join(names), **values)
+        f = np.stack([np.asarray(type(model)(**one).evaluate(data.geometry)) for one in channels_of(model)], -1)
+        assert cost(x) == pytest.approx(float((np.asarray(data.residual(f)) ** 2).sum()), rel=1e-9)
+    factor, step = screen.linear(x), 1e-5
+    slopes = 2 * factor[:, :-1].T @ factor[:, -1]
+    for k in range(len(slopes)):
+        moved = np.eye(len(x))[k] * step
+        assert (cost(x + moved) - cost(x - moved)) / (2 * step) == pytest.approx(slopes[k], rel=1e-5, abs=1e-9)
+
+
+def channels_of(model):
+    """The model of each channel."""
+    specs = parameters_of(model)
+    given = parameter_values(model)
+    return [{p.name: given[p.name][k] if p.per_channel else given[p.name] for p in specs} for k in range(3)]
+
+
+def test_more_effects_are_no_worse(scene):
+    """A fit that starts where one of fewer effects ended: the error cannot rise, for effects that leave a way back."""
+    screen, data, summary = scene
+    body = screen.fit(["body"])
+    lobe = screen.fit(["body", "lobe"], [body])
+    both = screen.fit(["body", "lobe", "second_lobe"], [lobe])
+    assert body.error > lobe.error >= both.error
+    same = screen.extended(["body", "lobe", "second_lobe"], lobe)
+    with jax.enable_x64(True):
+        np.testing.assert_allclose(own(same)(WI, WO), own(lobe)(WI, WO), rtol=1e-13)
+    again = alone(lobe, data, summary)  # by the program of these two effects
+    assert again.error == pytest.approx(lobe.error, rel=1e-3)
+    assert set(parameter_values(own(again))) == {"diffuse", "specular", "alpha"}
