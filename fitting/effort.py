@@ -30,6 +30,9 @@ class Effort:
     the ``gtr`` of red-phenolic."""
     rtol: float = 1e-9
     """Relative decrease of the cost in a step below which the last search ends, in (0, 1)."""
+    error_bars: bool = True
+    """Whether every cell is asked at the end how sure the parameters are and whether the compressed table was good enough:
+    a third to half of a fit. Without, all of that is NaN and the path never changes; errors are still of all cells."""
 
     def __post_init__(self) -> None:
         if self.path not in PATHS:

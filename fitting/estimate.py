@@ -13,16 +13,17 @@ from numpy.typing import NDArray
 from ..models import parameters_of
 from ..programs import program
 from .coordinates import Chart
-from .gram import Problem, Span, statistics
+from .gram import Problem, Span, loss_errors, statistics
 from .losses import Loss
 from .result import Named
 from .solver import Box
 from .threads import in_threads
-from .uncertainty import uncertainty
+from .uncertainty import Uncertainty, uncertainty, unknown
 
 Reals = NDArray[np.float64]
 
 _statistics = program(statistics)
+errors_of = program(loss_errors)
 
 
 @program
@@ -63,14 +64,24 @@ class Judgement:
     """Share of the error that this step would take off."""
 
 
-def judge(problem: Problem, x: Reals, box: Box, losses: tuple[Loss, ...]) -> Judgement:
+def judge(problem: Problem, x: Reals, box: Box, losses: tuple[Loss, ...], error_bars: bool = True) -> Judgement:
     """Parameters, their covariances and the errors at an optimum (one pass over all cells)."""
-    chart, channels, n = problem.chart, problem.channels, problem.size
+    n = problem.size
+    if not error_bars:
+        u = unknown(n)
+        estimate = _estimate(problem, x, box, u)
+        model = problem.chart.cls(**estimate.parameters)
+        return Judgement(estimate, np.asarray(errors_of(model, problem.samples, losses)), u.shift, u.gain)
     halves = in_threads(lambda span: _statistics(problem, x, losses, span), Span.halves(problem.samples))
     found = jax.tree.map(lambda *parts: np.sum(parts, 0), *halves)
-    at_lower, at_upper, free = x <= box.lower, x >= box.upper, np.asarray(box.free)
     bands = found.bands.reshape(-1, n + 1, n + 1)
-    u = uncertainty(bands, found.middle, free & ~at_lower & ~at_upper)
+    u = uncertainty(bands, found.middle, np.asarray(box.free) & (x > box.lower) & (x < box.upper))
+    return Judgement(_estimate(problem, x, box, u), np.sqrt(found.sums[:, 0] / found.sums[:, 1]), u.shift, u.gain)
+
+
+def _estimate(problem: Problem, x: Reals, box: Box, u: Uncertainty) -> Estimate:
+    """Parameters at coordinates x, and their covariances from those of the coordinates."""
+    chart, channels = problem.chart, problem.channels
     values, slopes = _parameters(chart, x, channels)
     specs = parameters_of(chart.cls)
     parameters = {p.name: np.asarray(values[p.name]) if p.per_channel else np.asarray(values[p.name])[0] for p in specs}
@@ -78,13 +89,13 @@ def judge(problem: Problem, x: Reals, box: Box, losses: tuple[Loss, ...]) -> Jud
     jacobian = np.stack([np.asarray(slopes[name])[k or 0] for name, k in rows])
     roots = [jacobian @ a for a in (u.statistical, u.jackknife)]
     statistical, jackknife = (a @ a.T for a in roots)
-    unknown = (np.abs(jacobian) * u.undetermined).sum(1) > 0
+    undetermined = (np.abs(jacobian) * u.undetermined).sum(1) > 0
     at = {p.name: [i for i, r in enumerate(rows) if r[0] == p.name] for p in specs}
 
     def deviation(matrix: Reals) -> Reals:
         # a parameter that nothing moves, held or at a bound, has no standard error: not 0, which would claim certainty
         variance = np.diag(matrix)
-        return np.asarray(np.sqrt(np.where((variance > 0) & ~unknown, variance, np.nan)))
+        return np.asarray(np.sqrt(np.where((variance > 0) & ~undetermined, variance, np.nan)))
 
     def named(sizes: Reals) -> Named:
         return {name: sizes[i].reshape(parameters[name].shape) for name, i in at.items()}
@@ -95,9 +106,9 @@ def judge(problem: Problem, x: Reals, box: Box, losses: tuple[Loss, ...]) -> Jud
 
     scale = deviation(statistical)
     labels = tuple(_label(r) for r in rows)
-    ends = free & (at_lower | at_upper)
+    ends = np.asarray(box.free) & ((x <= box.lower) | (x >= box.upper))
     bounded = [(c.parameter, k) for (c, k), end in zip(chart.vector(channels), ends, strict=True) if end]
-    estimate = Estimate(
+    return Estimate(
         parameters,
         named(scale),
         named(deviation(jackknife)),
@@ -105,9 +116,8 @@ def judge(problem: Problem, x: Reals, box: Box, losses: tuple[Loss, ...]) -> Jud
         tuple(f"{_label(b)} = {float(parameters[b[0]][() if b[1] is None else b[1]]):.6g}" for b in bounded),
         labels,
         statistical / scale[:, None] / scale,
-        tuple(label for label, u in zip(labels, unknown, strict=True) if u),
+        tuple(label for label, u in zip(labels, undetermined, strict=True) if u),
     )
-    return Judgement(estimate, np.sqrt(found.sums[:, 0] / found.sums[:, 1]), u.shift, u.gain)
 
 
 def make_ready(problem: Problem, losses: tuple[Loss, ...]) -> None:
@@ -120,4 +130,4 @@ def _label(row: tuple[str, int | None]) -> str:
     return row[0] if row[1] is None else f"{row[0]}[{row[1]}]"
 
 
-__all__ = ["Estimate", "Judgement", "judge", "make_ready"]
+__all__ = ["Estimate", "Judgement", "errors_of", "judge", "make_ready"]

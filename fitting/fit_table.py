@@ -16,12 +16,11 @@ from jaxtyping import ArrayLike
 from numpy.typing import NDArray
 
 from ..models import BRDF, channels, parameter_values, parameters_of, variants
-from ..programs import program
 from ..tables import Table
 from .coordinates import Chart, charts
 from .effort import DEFAULT, Effort
-from .estimate import Judgement, judge, make_ready
-from .gram import Problem, Span, loss_errors
+from .estimate import Judgement, errors_of, judge, make_ready
+from .gram import Problem, Span
 from .grid_samples import compress
 from .losses import LOSSES, Loss, LossFunction, named_loss
 from .plan import RUNGS, plan
@@ -44,8 +43,6 @@ EXACT = 1e-8
 """Error, relative to what the parameters do to the residual, below which a fit is exact: polar tables are good to 3e-9."""
 BLACK = 1e-14
 """Error below which a fit is exact whatever the parameters: a black channel has nothing to be small against."""
-
-_errors = program(loss_errors)
 
 
 @dataclass(frozen=True)
@@ -227,7 +224,8 @@ def _fit(
             proposals.insert(0, {**proposals[0], **_per_channel(cls, given, table.channels)})
         proposals = [{**p, **_per_channel(cls, held, table.channels)} for p in proposals]
         named = ready.losses
-        make_ready(Problem(ready.samples, bound_loss, forms[0]), named)
+        if effort.error_bars:
+            make_ready(Problem(ready.samples, bound_loss, forms[0]), named)
         found = _search(forms, ready.samples, bound_loss, proposals, frozenset(held), effort)
         found, judged = settle(found, Problem(ready.samples, bound_loss, found[0].problem.chart), named, effort)
         errors = judged.errors
@@ -268,7 +266,7 @@ def settle(found: list[Found], whole: Problem, losses: tuple[Loss, ...], effort:
         x = np.concatenate([np.asarray(f.minimum.x) for f in found])
         boxes = [(f.box.lower, f.box.upper, f.box.free) for f in found]
         box = Box(*(np.concatenate([np.asarray(b) for b in side]) for side in zip(*boxes, strict=True)))
-        return judge(whole, x, box, losses)
+        return judge(whole, x, box, losses, effort.error_bars)
 
     found = [replace(f, passes=f.passes + 1) for f in found]
     judgement = judged(found)
@@ -298,7 +296,7 @@ def evaluate(
     with jax.enable_x64(True):
         ready = prepare(table, max_angle, measure, LOSSES["log"] if loss is None else named_loss(loss))
         named = ready.losses
-        values = np.asarray(_errors(model, ready.samples, named))
+        values = np.asarray(errors_of(model, ready.samples, named))
     return {e.name: float(v) for e, v in zip(named, values, strict=True)}
 
 

@@ -71,7 +71,7 @@ def aligned(shape: tuple[int, ...], dtype: Any = float, fill: float = 0.0) -> np
     size = int(np.prod(shape)) * np.dtype(dtype).itemsize
     raw = np.empty(size + 64, np.uint8)
     begin = -raw.ctypes.data % 64
-    out = raw[begin : begin + size].view(dtype).reshape(shape)
+    out: np.ndarray = raw[begin : begin + size].view(dtype).reshape(shape)
     out[...] = fill
     return out
 

@@ -36,6 +36,11 @@ class Uncertainty:
     """Share of the error that this step would take off."""
 
 
+def unknown(n: int) -> Uncertainty:
+    """Of n coordinates of which nothing was asked."""
+    return Uncertainty(np.full((n, n), np.nan), np.full((n, 1), np.nan), np.zeros(n, bool), np.full(n, np.nan), np.nan)
+
+
 def uncertainty(bands: Reals, middle: Reals, moving: NDArray[np.bool_]) -> Uncertainty:
     """From Gram matrices of the bands ``[B, n+1, n+1]``, the sandwich's middle ``[n, n]`` and which coordinates move."""
     n = middle.shape[0]

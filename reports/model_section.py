@@ -252,6 +252,8 @@ def _agreed(f: Fit) -> str:
         return ""
     search = "compressed search" if f.path == "compressed" else "search that ended on every cell"
     passes = f"{words.thousands(f.passes)} {'pass' if f.passes == 1 else 'passes'} over the table"
+    if not f.effort.error_bars:
+        return f"Not asked how sure the parameters are ({search}, {passes})."
     if not math.isfinite(f.shift):
         return f"Every cell asked once more: how far the parameters would move cannot be said ({search}, {passes})."
     far = max(f.shift, 0.001)

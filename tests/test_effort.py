@@ -10,6 +10,7 @@ import pytest
 from brdfit import Effort
 from brdfit.data.synthetic import Relative, generate
 from brdfit.fitting.result import from_record
+from brdfit.reports.model_section import _agreed
 
 
 @pytest.fixture(scope="module")
@@ -49,6 +50,23 @@ def test_a_subsample_is_worse_and_says_so(table):
     assert part.passes < whole.passes
     for name, value in whole.stderr.items():  # error bars are of all cells either way
         np.testing.assert_allclose(part.stderr[name], value, rtol=0.3)
+
+
+def test_without_error_bars(table):
+    """The same optimum and errors; nothing is said of how sure they are, and a report can be made of it."""
+    bare, whole = (brdfit.fit(table, "ward", effort=Effort(error_bars=b)) for b in (False, True))
+    assert bare.converged
+    assert bare.at_bound == whole.at_bound
+    for name, value in whole.parameters.items():
+        np.testing.assert_array_equal(bare.parameters[name], value)
+        assert np.isnan(bare.stderr[name]).all()
+        assert np.isnan(bare.spread[name]).all()
+    # other sums of the same squares
+    assert bare.errors == pytest.approx(whole.errors, rel=1e-12)
+    assert np.isnan(bare.shift)
+    assert "Not asked how sure" in _agreed(bare)
+    assert "Every cell asked" in _agreed(whole)
+    assert json.loads(json.dumps(bare.record()))["stderr"]["alpha"] is None
 
 
 def test_fewer_starts(table):
