@@ -135,10 +135,10 @@ def compare(table: brdfit.Table, name: str, repeats: int) -> dict[str, Any]:
         "pass": lambda: whole_pass(problem, x0, Span.cells(samples)),
     }
     model = chart.cls(**{n: v[:channels] if v.ndim else v for n, v in fit.parameters.items()})
-    fast = brdfit.ready(model)
+    tabulated = brdfit.ready(model)
     call, bare = jax.jit(lambda m, wi, wo: m(wi, wo)), jax.jit(evaluate_channels)
     g, w = data[0], [jnp.asarray(v[ready.used]) for v in table.layout.directions()]
-    pieces |= {"call": lambda: call(fast, *w), "bare": lambda: bare(model, g)}
+    pieces |= {"call": lambda: call(tabulated, *w), "bare": lambda: bare(model, g)}
     times: dict[str, list[float]] = {k: [] for k in pieces}
     results = {}
     for repeat in range(repeats + 1):
