@@ -6,6 +6,7 @@ import csv
 import json
 import os
 import platform
+from collections import Counter
 from datetime import date
 from itertools import pairwise
 from pathlib import Path
@@ -18,6 +19,7 @@ from brdfit.reports.plots import new_figure, styled
 from brdfit.tradeoff.evaluation import Evaluation, direct
 from brdfit.tradeoff.pareto import front
 from brdfit.tradeoff.sample import draw
+from brdfit.tradeoff.tabulated import from_table, tabulate
 from brdfit.tradeoff.timing import interleaved
 
 LOSSES = ("perceptual", "log", "ngan")
@@ -41,6 +43,10 @@ KIND = {material: kind for kind, materials in KINDS.items() for material in mate
 CLOSE = 1.1
 """A model whose error is below this multiple of the best one's is as good in practice."""
 REPEATS = 30
+COSTLY = 3
+"""Models that are fitted last and may be missing for some materials."""
+SAME_AS = {"low_microfacet": "abc"}
+"""Models whose lobes are those of another, which is recommended in their place."""
 
 RANKS = """\
 By loss and for all three: the error over the smallest of any model on the same material, geometric mean over the
@@ -57,9 +63,12 @@ class Comparison:
     """Errors ``[models, materials, losses]`` of the finished fits, NaN where there is none."""
 
     def __init__(self, rows: list[Row], cost: dict[str, float]) -> None:
-        self.rows, self.cost = rows, cost
+        self.cost = cost
         kinds = list(KINDS)
-        known = {r["material"] for r in rows}
+        count = Counter(r["material"] for r in rows)
+        self.unfinished = [m for m in count if count[m] < max(count.values()) - len(LOSSES) * COSTLY]
+        known = set(count) - set(self.unfinished)
+        self.rows = [r for r in rows if r["material"] in known]
         self.materials = sorted(known, key=lambda m: (kinds.index(KIND[m]) if m in KIND else len(kinds), m))
         self.models = [m for m in MODELS if any(r["model"] == m for r in rows)]
         at = {(r["model"], r["material"], r["loss"]): r["error"] for r in rows}
@@ -78,7 +87,9 @@ class Comparison:
 
     def typical(self, name: str, loss: str | None = None, kind: str | None = None) -> float:
         """Geometric mean of :meth:`over_best`."""
-        return float(np.exp(np.nanmean(np.log(self.over_best(name, loss, kind)))))
+        known = self.over_best(name, loss, kind)
+        known = known[np.isfinite(known)]
+        return float(np.exp(np.log(known).mean())) if known.size else np.nan
 
     def wins(self, name: str, loss: str, kind: str) -> int:
         """On how many materials of a kind no model has a smaller error."""
@@ -90,10 +101,16 @@ class Comparison:
 
 def costs(rows: list[Row], table: brdfit.Table) -> dict[str, float]:
     """Nanoseconds to evaluate each model, as it was fitted to some material, in one pair of directions of a table, three
-    channels, float32, on one core."""
+    channels, float32, on one core. Masking that is an integral is read off a table made beforehand.
+    """
     sample = draw(table, 80.0, "solid_angle")
     fits = {r["model"]: r["parameters"] for r in reversed(rows) if r["loss"] == LOSSES[0]}
-    calls = {name: Evaluation(direct, model(name, **p), sample) for name, p in fits.items()}
+    calls = {}
+    for name, parameters in fits.items():
+        plain = model(name, **parameters)
+        tabulated = tabulate(plain, sample.max_angle)
+        quick = Evaluation(from_table(sample.max_angle), tabulated, sample) if tabulated.tables else None
+        calls[name] = quick or Evaluation(direct, plain, sample)
     times = interleaved(calls, REPEATS, 60.0)
     return {name: t.low / calls[name].count * 1e9 for name, t in times.items()}
 
@@ -131,7 +148,8 @@ def advice(c: Comparison, kind: str) -> list[str]:
     """Which model to use for a kind of material, in words."""
     loss = LOSSES[0]
     members = [m for m in c.materials if KIND.get(m) == kind]
-    by_error = sorted(c.models, key=lambda m: c.typical(m, loss, kind))
+    able = [m for m in c.models if m not in SAME_AS and not np.isnan(c.typical(m, loss, kind))]
+    by_error = sorted(able, key=lambda m: c.typical(m, loss, kind))
     best, *others = by_error
     lead = c.typical(best, loss, kind)
     close = [m for m in others if c.typical(m, loss, kind) <= CLOSE * lead]
@@ -154,7 +172,7 @@ def advice(c: Comparison, kind: str) -> list[str]:
             f"{c.typical(m, loss, kind):.2f}."
         )
     for other in LOSSES[1:]:
-        m = min(c.models, key=lambda m: c.typical(m, other, kind))
+        m = min((m for m in able if not np.isnan(c.typical(m, other, kind))), key=lambda m: c.typical(m, other, kind))
         value, its = c.typical(m, other, kind), c.typical(best, other, kind)
         leads = f"leads too ({value:.2f})" if m == best else f"leads ({value:.2f}; `{best}` {its:.2f})"
         words.append(f"Fitted and judged under `{other}`, `{m}` {leads}.")
@@ -166,14 +184,15 @@ def heat_map(c: Comparison, path: Path) -> None:
     rows = [c.models.index(m) for m in c.ranked]
     edges = [i for i in range(1, len(c.materials)) if KIND.get(c.materials[i]) != KIND.get(c.materials[i - 1])]
     with styled(grid=False):
-        figure, axes = new_figure(16, 9.2, (1.6, 0.95, 1.75, 0.55), 1, len(LOSSES), sharey=True)
+        figure, axes = new_figure(16, 9.4, (1.6, 0.95, 1.75, 0.75), 1, len(LOSSES), sharey=True)
         figure.subplots_adjust(wspace=0.04)
         for k, (ax, loss) in enumerate(zip(axes[0], LOSSES, strict=True)):
             values = np.log2(c.ratio[rows, :, k])
             image = ax.imshow(values, aspect="auto", cmap="viridis_r", vmin=0, vmax=4, interpolation="nearest")
             for e in edges:
                 ax.axvline(e - 0.5, color="white", lw=1.6)
-            ax.set_title(f"fitted and judged under {loss}", pad=22)
+            ax.set_title(f"fitted and judged under {loss}", pad=34)
+            ax.set_facecolor("#d8d8d8")
             starts = [0, *edges, len(c.materials)]
             for a, b in pairwise(starts):
                 name = KIND.get(c.materials[a], "others").replace(" ", "\n", 1)
@@ -185,7 +204,7 @@ def heat_map(c: Comparison, path: Path) -> None:
         axes[0, 0].set_yticks(range(len(rows)), c.ranked, fontsize=8)
         box = axes[0, -1].get_position()
         bar = figure.colorbar(image, cax=figure.add_axes((0.952, box.y0, 0.009, box.height)), extend="max")
-        bar.set_ticks(range(5), ["1", "2", "4", "8", "16"])
+        bar.set_ticks(range(5), labels=["1", "2", "4", "8", "16"])
         bar.set_label("error over that of the best model of the material (dots)")
         bar.outline.set_linewidth(0.4)
         figure.savefig(path, dpi=100)
@@ -200,12 +219,14 @@ def pareto(c: Comparison, path: Path) -> None:
         axes[1, 3].axis("off")
         for ax, kind in zip(axes.ravel(), kinds, strict=False):
             points = [(c.cost[m], c.typical(m, LOSSES[0], kind)) for m in c.models]
+            if not np.isfinite(points).any():
+                continue
             best = front(points)
             x, y = np.array(points).T
             ax.set_xscale("log")
             ax.set_yscale("log")
             ax.set_xlim(x.min() / 3.2, x.max() * 1.3)
-            ax.set_ylim(0.8, y.max() * 1.15)
+            ax.set_ylim(0.8, np.nanmax(y) * 1.15)
             ax.plot(x, y, "o", ms=4, mfc="white", mec="#8a8a8a", lw=0)
             ax.plot(x[best], y[best], "o-", ms=5, color="#0072B2", lw=0.9, drawstyle="steps-post")
             height = np.inf
@@ -217,7 +238,7 @@ def pareto(c: Comparison, path: Path) -> None:
                     c.models[i], points[i], (-5, drop), textcoords="offset points", ha="right", va="center", fontsize=7
                 )
             ax.set_title("all materials" if kind is None else kind)
-            ticks = [t for t in (1, 1.5, 2, 3, 5, 10, 20, 50) if t < y.max() * 1.15]
+            ticks = [t for t in (1, 1.5, 2, 3, 5, 10, 20, 50) if t < np.nanmax(y) * 1.15]
             ax.set_yticks(ticks, [f"{t:g}" for t in ticks])
             ax.yaxis.set_minor_locator(_none())
         for ax in axes[:, 0]:
@@ -227,7 +248,7 @@ def pareto(c: Comparison, path: Path) -> None:
         text = (
             "Each point is a model; filled, on the line:\nno other model is both cheaper and better.\n\n"
             "Error: geometric mean over the materials of\nthe error over the smallest of any model.\n\n"
-            "Cost: one core, float32, three channels,\ncompiled, 8,192 directions at a time."
+            "Cost: one core, float32, three channels,\ncompiled, 8,192 directions at a time;\nSmith's integral from a table."
         )
         axes[1, 3].text(0.05, 0.95, text, va="top", fontsize=9, color="#333333")
         figure.savefig(path, dpi=100)
@@ -286,6 +307,8 @@ def table(rows: list[Row], path: Path) -> None:
 def write(out: Path, rows: list[Row], first: brdfit.Table, command: str, settings: str) -> None:
     """The page, its two pictures and the table of all fits, side by side."""
     c = Comparison(rows, costs(rows, first))
+    rows = c.rows
+    settings += f" Not done yet: {', '.join(c.unfinished)}." if c.unfinished else ""
     base = out.with_suffix("")
     heat_map(c, base.with_name(base.name + "_errors.png"))
     pareto(c, base.with_name(base.name + "_cost.png"))
