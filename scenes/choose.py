@@ -19,9 +19,11 @@ Effects = frozenset[str]
 
 STALLED = 0.02
 """Relative decrease of the error of a fit below which one more effect does not count as progress."""
-ALIKE = 0.2
-"""Relative difference of times that is not told from none: the model with fewer operations then counts as cheaper. Other
-work on the machine moves the median of nine by as much."""
+ALIKE = 0.5
+"""Relative difference of times within which the model with fewer operations counts as cheaper: other work on the machine
+moves times by as much, and the choice is not to depend on it."""
+CALL = 20
+"""Operations that an exp, a log or a root counts as: the times of compositions of two to eleven effects grow like that."""
 PLAIN = ("body", "rough_body", "lobe", "fresnel", "masking", "trade_off")
 """Effects that take few operations each: no exponential, no logarithm, no further lobe."""
 NEARLY = 0.02
@@ -343,7 +345,7 @@ def _cheapest(several: Sequence[Tried]) -> Tried:
     """The model that takes the least time; of those that are :data:`ALIKE`, that with the fewest operations."""
     least = min(t.nanoseconds for t in several)
     alike = [t for t in several if t.nanoseconds <= (1 + ALIKE) * least]
-    return min(alike, key=lambda t: (t.operations.flops + t.operations.transcendentals, len(t.effects)))
+    return min(alike, key=lambda t: (t.operations.flops + CALL * t.operations.transcendentals, len(t.effects)))
 
 
 def _verdict(name: str, chosen: Tried, known: dict[Effects, Tried]) -> Verdict:

@@ -23,7 +23,7 @@ from .survey import Study
 
 PAGE, NUMBERS, PICTURES = "scene.html", "scene.json", "scene.exr"
 WHY_LEFT_OUT = {
-    "interreflection": "its fit would take longer than all the rest of the search",
+    "interreflection": "each evaluation would take a hundred times all the rest",
     "anisotropy": "the table is isotropic",
 }
 TOP = 10.0
@@ -119,14 +119,22 @@ def summary(study: Study) -> str:
             f"No set of effects meets the tolerance: the best, {_names(choice.chosen)}, ends at {figures}. {missing(study)}"
         )
     said += (
-        f" It takes {significant(choice.chosen.nanoseconds, 2)} ns a direction, {ratio} as all "
-        f"{len(choice.everything.effects)} effects together ({significant(choice.everything.nanoseconds, 2)} ns, "
-        f"{significant(choice.everything.error)})."
+        f" It takes {significant(choice.chosen.nanoseconds, 2)} ns a direction, {ratio} as {everything(study)} "
+        f"({significant(choice.everything.nanoseconds, 2)} ns, {significant(choice.everything.error)})."
     )
     if not choice.affordable and study.scene.budget is not None:
         pixel = significant(study.lights * choice.chosen.nanoseconds, 2)
         said += f" With {study.lights} such a pixel, {pixel} ns, that is more than the budget of {study.scene.budget:g} ns."
     return said
+
+
+def everything(study: Study) -> str:
+    """What the model of everything consists of, in words."""
+    used = study.choice.everything.effects
+    lacking = [n for n in EFFECTS if n not in used and n not in study.left_out]
+    if not lacking:
+        return f"all {len(used)} effects together"
+    return f"everything, {len(used)} effects without {listed(_plain(n) for n in lacking)}"
 
 
 def missing(study: Study) -> str:
@@ -157,9 +165,9 @@ def because(study: Study, v: Verdict) -> str:
     there = significant(other.error)
     if v.called:
         gone = [n for n in chosen.effects if n not in other.effects and n != v.effect]
-        so = f" (nor {listed(_plain(n) for n in gone)}, which need it)" if gone else ""
+        so = f" (nor {listed(_plain(n) for n in gone)}, which need{'s' if len(gone) == 1 else ''} it)" if gone else ""
         return f"without it{so} the error is {there}, not {here}"
-    return f"with it the error is {there}, not {here}"
+    return f"with it the error {f'stays at {here}' if here == there else f'is {there}, not {here}'}"
 
 
 def _untried(study: Study, effect: str) -> str:
