@@ -2,8 +2,9 @@
 
     python benchmarks/cold_start.py FILE [--repeats 3]
 
-Then the compiler's setting of brdfit/programs.py beside its default: seconds to compile one gram pass of each model, and to
-run it over the compressed table.
+Beside it a plain script of NumPy and SciPy that fits the same table (plain_scipy.py). Then the compiler's settings of
+brdfit/programs.py beside its defaults: seconds to compile one gram pass of each model, and to run it over the compressed
+table.
 """
 
 from __future__ import annotations
@@ -55,6 +56,8 @@ def commands(file: str, repeats: int) -> None:
                 call = [sys.executable, "-m", "brdfit", "fit", file, "--out", str(Path(home) / "out"), *options]
                 for cache in ("empty", "warm"):
                     found.setdefault((name, cache), []).append(seconds(call, Path(home)))
+        plain = [sys.executable, str(Path(__file__).with_name("plain_scipy.py")), file]
+        found.setdefault(("abc by NumPy and SciPy", "no"), []).append(seconds(plain, Path.home()))
     for (name, cache), runs in found.items():
         wall, cpu = (sorted(r[k] for r in runs) for k in (0, 1))
         print(
