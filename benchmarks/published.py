@@ -196,14 +196,14 @@ def page(rows: list[Row], units: dict[str, Reals], command: str) -> str:
         "",
         LENGTHS,
         "",
-        "| factor on | " + " | ".join(f"{u:.2g}" for u in UNITS) + " |",
+        "| factor on | " + " | ".join(f"{u:.3g}" for u in UNITS) + " |",
         "|---|" + "---|" * len(UNITS),
         *(f"| {which} | " + " | ".join(f"{e:.4f}" for e in found) + " |" for which, found in units.items()),
         "",
-        f"The smallest error with both lengths scaled is at {best:.2g}. "
+        f"The smallest error with both lengths scaled is at {best:.3g}. "
         + (
-            "So the unit is the wavelength: with micrometres (a factor of 1.8 at 0.55 micrometres) or the inverse of the "
-            "wave number (0.16) the published fits are worse."
+            "Of the units that\nare known the wavelength is the nearest: with micrometres (a factor of 1.8 at 0.55 "
+            "micrometres) or the inverse of the\nwave number (0.16) the published fits are worse."
             if 0.75 < best < 1.34
             else "That is not the wavelength, nor another unit that is known: it stays unsettled."
         ),
