@@ -30,6 +30,8 @@ NEARLY = 0.02
 """Relative difference of image errors within which, where no set meets the tolerance, a cheaper one is as good."""
 EXHAUSTED = 6
 """Effects of a set of which all subsets that meet the tolerance are looked at; of larger sets only the best."""
+EXCHANGED = 2
+"""Sets of which each effect is exchanged for each other one, at most: those with the fewest effects."""
 TIMED = 4
 """Sets that compete for being the cheapest, at most: those with the fewest effects."""
 
@@ -310,7 +312,7 @@ def choose(bench: Bench, tolerance: Tolerance, budget: float | None, among: Sequ
         search.downwards(top)
         if search.good(plain := search.upwards(PLAIN)):
             search.downwards(plain)
-        for t in search.smallest():
+        for t in search.smallest()[:EXCHANGED]:
             for other in search.exchanged(t):
                 search.downwards(other)
         found = search.fastest()
