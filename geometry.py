@@ -23,6 +23,7 @@ import numpy as np
 from jaxtyping import Array, ArrayLike, Float
 
 from .polar import PolarStencil, PolarTables
+from .special import root, sine
 
 Field = Float[Array, "..."]
 
@@ -84,6 +85,16 @@ class Geometry(eqx.Module):
     def vers_d(self) -> Field:
         """1 - cos(theta_d), accurate near 0."""
         return self.sin2_d / (1 + self.cos_d)
+
+    @property
+    def sin_i(self) -> Field:
+        """sin(theta_i), accurate near 0 where the direction is known; never quite 0, as :func:`brdfit.special.sine`."""
+        return _sine(self.cos_i, self.light)
+
+    @property
+    def sin_o(self) -> Field:
+        """sin(theta_o), likewise."""
+        return _sine(self.cos_o, self.viewer)
 
     @property
     def theta_i(self) -> Field:
@@ -162,6 +173,10 @@ class Geometry(eqx.Module):
         shape = self.shape
         fields = (self.cos_i, self.cos_o, self.cos_h, self.sin2_h, self.cos_d, self.sin2_d, self.h_x2, self.h_y2)
         return Geometry(*(None if f is None else jnp.broadcast_to(f, shape).reshape(-1) for f in fields))  # type: ignore[arg-type]
+
+
+def _sine(cosine: Field, direction: Array | None) -> Field:
+    return sine(cosine) if direction is None else root(direction[..., 0] ** 2 + direction[..., 1] ** 2)
 
 
 def from_directions(wi: ArrayLike, wo: ArrayLike) -> Geometry:

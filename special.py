@@ -57,14 +57,18 @@ def log1p_ratio(x: ArrayLike) -> Scalars:
     return jnp.where(small, log1p_series(x), jnp.log1p(far) / far)
 
 
-def sine(cosine: Scalars) -> Scalars:
-    """sin(theta) of cos(theta) in [0, 1], not below the eighth root of the smallest number of its precision.
+def root(square: Scalars) -> Scalars:
+    """The root of a square, not below the eighth root of the smallest number of its precision.
 
     Guard: the root has no derivative at 0, and quotients of sines and angles are 0/0 there; the eighth power, as in
     derivatives of products of quotients, can still be divided by (tests/test_empirical.py::test_finite).
     """
-    square = (1 - cosine) * (1 + cosine)
     return jnp.sqrt(jnp.maximum(square, float(np.finfo(square.dtype).tiny) ** 0.25))
+
+
+def sine(cosine: Scalars) -> Scalars:
+    """sin(theta) of cos(theta) in [0, 1], never quite 0: see :func:`root`."""
+    return root((1 - cosine) * (1 + cosine))
 
 
 @jax.custom_jvp

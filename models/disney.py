@@ -24,9 +24,9 @@ def _colour(meaning: str, default: float) -> Any:
     return _share(meaning, default, per_channel=True, linear=True)
 
 
-def _grazing(cosine: Value) -> Value:
-    """Schlick's (1 - cos)^5."""
-    return (1 - cosine) ** 5
+def _towards(end: Value, cosine: Value) -> Value:
+    """1 + (end - 1)(1 - cos)^5 as 1 - (1 - cos)^5, a polynomial that does not cancel at grazing, and the rest."""
+    return cosine * (5 + cosine * (-10 + cosine * (10 + cosine * (-5 + cosine)))) + end * (1 - cosine) ** 5
 
 
 def _visibility(alpha: Any, g: Geometry) -> Value:
@@ -38,10 +38,9 @@ def _visibility(alpha: Any, g: Geometry) -> Value:
 
 def _body(m: Any, g: Geometry) -> Value:
     """Body, subsurface and sheen."""
-    light, viewer = _grazing(g.cos_i), _grazing(g.cos_o)
     retro = m.roughness * g.cos_d**2
-    rough = (1 + (2 * retro - 0.5) * light) * (1 + (2 * retro - 0.5) * viewer)
-    flat = (1 + (retro - 1) * light) * (1 + (retro - 1) * viewer)
+    rough = _towards(0.5 + 2 * retro, g.cos_i) * _towards(0.5 + 2 * retro, g.cos_o)
+    flat = _towards(retro, g.cos_i) * _towards(retro, g.cos_o)
     under = 1.25 * (flat * (1 / (g.cos_i + g.cos_o) - 0.5) + 0.5)
     body = m.base_color / jnp.pi * (rough + m.subsurface * (under - rough))
     value: Value = (1 - m.metallic) * (body + m.sheen * g.vers_d**5)

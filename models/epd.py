@@ -12,7 +12,6 @@ EPD = named(
     diffraction lobe), G its exact height-correlated Smith masking.
 
     Reciprocal. The lobe conserves energy for specular <= 1. At the mirror direction derivatives by directions do not exist
-    for p <= 1/2 and are given as 0. Known failures: for p < 0.3 alpha and p trade off (only the tail is determined); G is
-    good to 1e-9 for p <= 1.25 and to 4e-8 at the end of the range, p = 1.5.
+    for p <= 1/2 and are given as 0. Known failures: for p < 0.3 alpha and p trade off (only the tail is determined).
     """,
 )

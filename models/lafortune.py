@@ -31,8 +31,9 @@ def _lobe(tilt: Float[Array, ""], exponent: Float[Array, ""], g: Geometry) -> Fl
     1 - x is formed as a sum of what is not negative: 1 - r.v or 1 - l.v, and what the lobe is off these directions.
     """
     s, c = jnp.where(tilt >= 0, 1, -1) * jnp.sin(tilt), jnp.cos(tilt)
-    largest = jnp.maximum(s, c)
-    across, along = s / largest, c / largest
+    steep, ratio = s > c, jnp.minimum(s, c) / jnp.maximum(s, c)
+    # not s and c over the larger of them, whose derivative is then 0 but for rounding, which a large exponent multiplies
+    across, along = jnp.where(steep, 1, ratio), jnp.where(steep, ratio, 1)
     product = g.cos_i * g.cos_o
     rest = g.sin2_d + g.cos_d**2 * g.sin2_h + (g.cos_i - g.cos_o) ** 2 / 4  # 1 - product
     deficit = across * jnp.where(tilt >= 0, mirror_deficit(g), 2 * g.sin2_d) + (1 - across) * rest + (1 - along) * product

@@ -51,8 +51,8 @@ class OrenNayarFull(BRDF):
     the functional form with interreflection; the coefficients stand at :func:`~brdfit.models.diffuse.oren_nayar_full`).
 
     The last term is light reflected twice within a groove: the BRDF is not affine in diffuse. Reciprocal. Energy is not
-    bounded by the form, C1 to C3 being fits to numerical integrals. Known failure: for sigma above some 0.6 it is negative
-    between grazing light and a grazing viewer opposite.
+    bounded by the form, C1 to C3 being fits to numerical integrals. Known failures: for sigma above some 0.6 it is negative
+    between grazing light and a grazing viewer opposite; in float32 slopes by directions that both graze have two digits.
     """
 
     name: ClassVar[str] = "oren_nayar_full"

@@ -27,7 +27,8 @@ class StamDiffraction(BRDF):
     model this is the case without masking: neither S nor the effective roughness. What is his is colour: sigma and tau are
     in wavelengths, one pair for each channel, and where diffraction makes the colours they are inversely proportional to
     its wavelength. Not here: his periodic surfaces (the compact disc), which an isotropic table cannot show.
-    Reciprocal. Without masking the albedo exceeds 1 at grazing. Known failures: those of :class:`HTSG`, for each channel.
+    Reciprocal. Without masking the albedo exceeds 1 at grazing. Known failures: those of :class:`HTSG`, for each channel;
+    in float32 slopes are good to 2e-4 for sigma of 10.
     """
 
     name: ClassVar[str] = "stam_diffraction"

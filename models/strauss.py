@@ -8,7 +8,6 @@ import jax.numpy as jnp
 from jaxtyping import Array, Float
 
 from ..geometry import Geometry
-from ..special import sine
 from .base import BRDF, Interval, parameter
 from .common import diffuse_parameter, exponent_shapes
 from .mirror import cosine_power, mirror_deficit
@@ -27,9 +26,9 @@ def _fresnel(x: Float[Array, "..."]) -> Float[Array, "..."]:
     return x * (2 * K_F - x) / (x - K_F) ** 2 / end
 
 
-def _unshadowed(x: Float[Array, "..."]) -> Float[Array, "..."]:
-    """[1/(1 - k)^2 - 1/(x - k)^2]/[1/(1 - k)^2 - 1/k^2], k = K_G, from 1 to 0."""
-    return (1 - x) * (2 * K_G - 1 - x) / (x - K_G) ** 2 * K_G**2 / (2 * K_G - 1)
+def _unshadowed(y: Float[Array, "..."]) -> Float[Array, "..."]:
+    """[1/(1 - k)^2 - 1/(x - k)^2]/[1/(1 - k)^2 - 1/k^2], k = K_G, from 1 to 0, of y = 1 - x, which is small at grazing."""
+    return y * (2 * (K_G - 1) + y) / (y + K_G - 1) ** 2 * K_G**2 / (2 * K_G - 1)
 
 
 class Strauss(BRDF):
@@ -40,7 +39,8 @@ class Strauss(BRDF):
     s, m, t = smoothness, metalness, transparency; diffuse is the colour C. The survey's formula gives intensities under a
     light of intensity 1; over pi, it is Lambert's law at s = m = t = 0, F = 0. It prints r_j without its last bracket.
     Not reciprocal, does not conserve energy. Known failures: the highlight has no scale of its own and is at most
-    1/(pi n.l) high, far below those of measured glossy materials; r_j has a kink where it reaches 1.
+    1/(pi n.l) high, far below those of measured glossy materials; r_j has a kink where it reaches 1; in float32 slopes at
+    the horizon are good to 5e-5.
     """
 
     name: ClassVar[str] = "strauss"
@@ -60,10 +60,10 @@ class Strauss(BRDF):
     def evaluate(self, g: Geometry) -> Float[Array, "..."]:
         """Value in 1/sr."""
         s, m, t = self.smoothness, self.metalness, self.transparency
-        x, y = (2 / jnp.pi * jnp.arctan2(sine(c), c) for c in (g.cos_i, g.cos_o))
-        f = _fresnel(x)
+        f = _fresnel(2 / jnp.pi * jnp.arctan2(g.sin_i, g.cos_i))
+        light, viewer = (2 / jnp.pi * jnp.arctan2(c, away) for c, away in ((g.cos_i, g.sin_i), (g.cos_o, g.sin_o)))
         normal = (1 - t) * s**3
-        reflectivity = jnp.minimum(1, normal + (normal + K_J) * f * _unshadowed(x) * _unshadowed(y))
+        reflectivity = jnp.minimum(1, normal + (normal + K_J) * f * _unshadowed(light) * _unshadowed(viewer))
         lobe = reflectivity * cosine_power(mirror_deficit(g), 3 / (1 - s)) / g.cos_i
         body = (1 - m * s) * (1 - s**3) * (1 - t)
         return (body * self.diffuse + lobe * (1 + m * (1 - f) * (self.diffuse - 1))) / jnp.pi

@@ -110,7 +110,7 @@ def test_approximations_are_near():
 def test_conductors(name: str):
     """Against amplitudes of the complex index in 40 digits, from normal incidence to grazing, next to a dielectric too."""
     wi, wo = WI[GEOMETRY_CASES], WO[GEOMETRY_CASES]
-    n, k = points([0.05, 0.5, 1.2, 1.5, 20.0], [1e-6, 0.1, 3.0, 80.0])
+    n, k = points([0.05, 0.5, 1.2, 1.5, 20.0], [0.0, 1e-6, 0.1, 3.0, 80.0])
     with jax.enable_x64(True):
         g = from_directions(wi, wo)
         f = jax.jit(jax.vmap(lambda n, k: getattr(fresnel, name)(n, k, g)))

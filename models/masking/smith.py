@@ -16,7 +16,8 @@ from ...quadrature import smith_kernel
 NODES = 170
 REACH = 28.0
 """Range of u of the quadrature: ln(2 tan(theta)) is 10 at 89.995 degrees, and u - 10 = 18 holds densities that change
-within e^-10 of the horizon. A density that needs less says so as ``smith_reach``, which sets the nodes closer."""
+within e^-10 of the horizon. A density that needs less says so as ``smith_reach``, which sets the nodes closer; one that
+needs more nodes as ``smith_nodes``."""
 
 NDF = Callable[[Float[Array, "..."], Float[Array, "..."]], Float[Array, "..."]]
 
@@ -50,7 +51,7 @@ def averted_area(ndf: NDF, cosine: Float[Array, "..."], rule: Rule | None = None
     own = getattr(ndf, "averted_area", None)
     if own is not None:
         return jnp.asarray(own(cosine))
-    rule = rule or smith_kernel(NODES, getattr(ndf, "smith_reach", REACH))
+    rule = rule or smith_kernel(getattr(ndf, "smith_nodes", NODES), getattr(ndf, "smith_reach", REACH))
     cos2_t, g, slope, bend = (jnp.asarray(a, cosine.dtype) for a in rule)
     oblique = cosine < 0.5
     held = jnp.where(oblique, jax.lax.stop_gradient(cosine), cosine)

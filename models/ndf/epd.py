@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from typing import ClassVar
+
 import equinox as eqx
 import jax
 import jax.numpy as jnp
@@ -23,6 +25,9 @@ class EPD(eqx.Module):
 
     alpha: Float[Array, ""]
     p: Float[Array, ""]
+
+    smith_nodes: ClassVar[int] = 300
+    """See :func:`brdfit.models.masking.smith_lambda`: exp(-tan^(2 p)) is analytic within pi/(4 p) of the real axis only."""
 
     def __call__(self, sin2: Float[Array, "..."], cos2: Float[Array, "..."]) -> Float[Array, "..."]:
         """D in 1/sr."""
