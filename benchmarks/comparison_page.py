@@ -104,7 +104,7 @@ def costs(rows: list[Row], table: brdfit.Table) -> dict[str, float]:
     channels, float32, on one core. Masking that is an integral is read off a table made beforehand.
     """
     sample = draw(table, 80.0, "solid_angle")
-    fits = {r["model"]: r["parameters"] for r in reversed(rows) if r["loss"] == LOSSES[0]}
+    fits = {r["model"]: r["parameters"] for r in reversed(rows)}
     calls = {}
     for name, parameters in fits.items():
         plain = model(name, **parameters)

@@ -70,7 +70,9 @@ def _first(g: Array, t: Array, peak: Array, width: Array) -> _Sums:
 
     nothing = jnp.zeros_like(g)
     start = jnp.where(here, jnp.exp(-g), 0)
-    return jax.lax.fori_loop(1, last.astype(int) + 1, step, (start, _Sums(nothing, nothing, nothing)))[1]
+    sums: _Sums
+    _, sums = jax.lax.fori_loop(1, last.astype(int) + 1, step, (start, _Sums(nothing, nothing, nothing)))
+    return sums
 
 
 def _around(g: Array, t: Array, peak: Array, width: Array) -> _Sums:
