@@ -13,6 +13,7 @@ import pytest
 from brdfit import models
 from brdfit.models import BRDF, parameters_of
 from brdfit.models.kirchhoff import scattering_series
+from brdfit.models.lafortune import lobes
 from brdfit.programs import OPTIONS
 from brdfit.reports.physics import hemisphere
 from brdfit.stability import empirical as oracle
@@ -149,6 +150,18 @@ def test_energy(row: Row):
             light, viewers, weight = hemisphere(theta)
             albedo = np.asarray(f(stacked, jnp.asarray(light), jnp.asarray(viewers))) @ weight
             assert (albedo <= 1 + 1e-6).all(), (np.degrees(theta), albedo)
+
+
+def test_lobes_of_lafortune():
+    """Four lobes of which two are black are the other two; a model has at least one."""
+    shapes = {"tilt_1": 0.8, "tilt_2": -0.7, "exponent_1": 40.0, "exponent_2": 5.0}
+    scales = {"diffuse": 0.1, "specular_1": 0.3, "specular_2": 0.2}
+    black = {f"{name}_{k}": 0.0 for name in ("specular", "tilt", "exponent") for k in (3, 4)}
+    four = models.build(lobes(4), {**scales, **shapes, **black})
+    with jax.enable_x64(True):
+        np.testing.assert_array_equal(four(WI, WO), models.model("lafortune2", **scales, **shapes)(WI, WO))
+    with pytest.raises(ValueError, match="Lafortune's model has at least one lobe, not 0"):
+        lobes(0)
 
 
 def test_mirror_term():
