@@ -98,7 +98,8 @@ def main() -> None:
         f"{', '.join(f'`{m}`' for m in EFFORT)}, whose passes take longest, {COSTLY.starts} of half as many shapes, to "
         f"{COSTLY.rtol:g}. The fits of this run took {took:.0f} s."
     )
-    write(args.out, [r for r in rows if r["material"] in names], brdfit.load(tables[0]), command, settings)
+    chosen = [r for r in rows if r["material"] in names]
+    write(args.out, chosen, sorted(names), brdfit.load(tables[0]), command, settings)
     print(args.out)
 
 

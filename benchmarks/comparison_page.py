@@ -42,6 +42,8 @@ KINDS = {
 KIND = {material: kind for kind, materials in KINDS.items() for material in materials.split()}
 CLOSE = 1.1
 """A model whose error is below this multiple of the best one's is as good in practice."""
+CHEAPER, BEARABLE = 0.7, 3.0
+"""A model that costs less than this share of the best one's time is named, if its error is below this multiple."""
 REPEATS = 30
 COSTLY = 3
 """Models that are fitted last and may be missing for some materials."""
@@ -66,8 +68,7 @@ class Comparison:
         self.cost = cost
         kinds = list(KINDS)
         count = Counter(r["material"] for r in rows)
-        self.unfinished = [m for m in count if count[m] < max(count.values()) - len(LOSSES) * COSTLY]
-        known = set(count) - set(self.unfinished)
+        known = {m for m in count if count[m] >= max(count.values()) - len(LOSSES) * COSTLY}
         self.rows = [r for r in rows if r["material"] in known]
         self.materials = sorted(known, key=lambda m: (kinds.index(KIND[m]) if m in KIND else len(kinds), m))
         self.models = [m for m in MODELS if any(r["model"] == m for r in rows)]
@@ -133,7 +134,7 @@ def ranking(c: Comparison) -> list[str]:
     ]
     for k, m in enumerate(c.ranked, 1):
         mine = c.of(m)
-        typical = [f"{c.typical(m, loss):.2f}" for loss in LOSSES]
+        typical = ["–" if np.isnan(t) else f"{t:.2f}" for t in (c.typical(m, loss) for loss in LOSSES)]
         bent = sum(_bent(m, r) for r in mine) / len(mine)
         converged = sum(r["converged"] for r in mine)
         seconds = np.quantile([r["seconds"] for r in mine], 0.25)
@@ -153,7 +154,7 @@ def advice(c: Comparison, kind: str) -> list[str]:
     best, *others = by_error
     lead = c.typical(best, loss, kind)
     close = [m for m in others if c.typical(m, loss, kind) <= CLOSE * lead]
-    cheap = [m for m in by_error if c.cost[m] < 0.7 * c.cost[best]]
+    cheap = [m for m in by_error if c.cost[m] < CHEAPER * c.cost[best] and c.typical(m, loss, kind) < BEARABLE * lead]
     words = [
         f"**{kind[0].upper()}{kind[1:]}** ({len(members)}: {', '.join(members)}). "
         f"Use `{best}`: its `{loss}` error is {lead:.2f} times the smallest of any model, on average, and it is the best "
@@ -168,7 +169,7 @@ def advice(c: Comparison, kind: str) -> list[str]:
     if cheap:
         m = cheap[0]
         words.append(
-            f"Of the models that cost less than 0.7 of its {c.cost[best]:.0f} ns, `{m}` ({c.cost[m]:.0f} ns) loses least: "
+            f"Of the models that cost less than {CHEAPER} of its {c.cost[best]:.0f} ns, `{m}` ({c.cost[m]:.0f} ns) loses least: "
             f"{c.typical(m, loss, kind):.2f}."
         )
     for other in LOSSES[1:]:
@@ -304,11 +305,26 @@ def table(rows: list[Row], path: Path) -> None:
             )
 
 
-def write(out: Path, rows: list[Row], first: brdfit.Table, command: str, settings: str) -> None:
+def _missing(c: Comparison, materials: list[str]) -> str:
+    """What of the comparison has not been done yet, in words; nothing if all has."""
+    words = []
+    if left := [m for m in materials if m not in c.materials]:
+        words.append(
+            f"Not done yet, left out of all numbers: {len(left)} of {len(materials)} materials ({', '.join(left)})."
+        )
+    partly = {m: len(c.of(m)) for m in c.models if len(c.of(m)) < len(c.materials) * len(LOSSES)}
+    if partly:
+        some = ", ".join(f"`{m}` {n}" for m, n in partly.items())
+        words.append(
+            f"Of {len(c.materials) * len(LOSSES)} fits a model some have fewer, over which their means are: {some}."
+        )
+    return " ".join([*words, "The same command goes on from the fits that are kept."]) if words else ""
+
+
+def write(out: Path, rows: list[Row], materials: list[str], first: brdfit.Table, command: str, settings: str) -> None:
     """The page, its two pictures and the table of all fits, side by side."""
     c = Comparison(rows, costs(rows, first))
     rows = c.rows
-    settings += f" Not done yet: {', '.join(c.unfinished)}." if c.unfinished else ""
     base = out.with_suffix("")
     heat_map(c, base.with_name(base.name + "_errors.png"))
     pareto(c, base.with_name(base.name + "_cost.png"))
@@ -322,6 +338,7 @@ def write(out: Path, rows: list[Row], first: brdfit.Table, command: str, setting
         f"`{command}`",
         f"({os.cpu_count()} cores, {platform.machine()}). {settings} {_checked(c)}",
         "",
+        *([missing, ""] if (missing := _missing(c, materials)) else []),
         "Each fit is judged under the loss that it was fitted with. `perceptual` ranks fits as people do, `log` is what a",
         "fit minimises by default, and `ngan` compares the values themselves, so that peaks decide. Every fit, with its",
         f"parameters, is in [{base.name}.csv]({base.name}.csv).",
