@@ -109,6 +109,9 @@ def page(rows: list[Row], command: str) -> str:
         "|---|---|---|---|---|",
         *(verdict(rows, model, error) for model in MODELS for error in ERRORS),
         "",
+        "The default stays what published fits and the best errors known are stated under, so that a result can be held",
+        "against them as it comes. To render with a fit, choose by the tables below.",
+        "",
     ]
     for error, title in ERRORS.items():
         lines += [
