@@ -203,12 +203,18 @@ class _Search:
     def top(self) -> Tried:
         """A set that meets the tolerance, if there is one: the best one otherwise."""
         here = self.upwards(self.among)
-        return here if self.good(here) else self.better(here, *self.explore([frozenset(self.among)], here))
+        if self.good(here):
+            return here
+        other = self.upwards(self.among, self.upwards(PLAIN))
+        if self.good(other):
+            return other
+        return self.better(here, other, *self.explore([frozenset(self.among)], here, other))
 
-    def upwards(self, among: Sequence[str]) -> Tried:
+    def upwards(self, among: Sequence[str], here: Tried | None = None) -> Tried:
         """Effect by effect, that which lowers the error of the fit most, until the tolerance is met or nothing helps."""
         among = [n for n in among if n in self.among]
-        here = min(self.explore(s for n in among if possible(s := frozenset([n]))), key=lambda t: t.fit_error)
+        if here is None:
+            here = min(self.explore(s for n in among if possible(s := frozenset([n]))), key=lambda t: t.fit_error)
         while not self.good(here):
             wider = self.explore(larger(frozenset(here.effects), among), here)
             if not wider:
@@ -299,8 +305,9 @@ class _Search:
 def choose(bench: Bench, tolerance: Tolerance, budget: float | None, among: Sequence[str]) -> Choice:
     """Search forward until the tolerance is met, then backward for what can be left out, then sideways.
 
-    Forward, the effect whose addition lowers the error of the fit most is added. Where that stalls, everything is tried.
-    The same is done with effects that cost little alone (:data:`PLAIN`): a set of more of them may still be the faster one.
+    Forward, the effect whose addition lowers the error of the fit most is added. The same is done with effects that cost
+    little alone (:data:`PLAIN`), for a set of more of them may still be the faster one; where the first search stalls, the
+    second goes on with all effects from there, and then everything is tried.
     Backward, all that can be left out of the set is; sideways, each effect is exchanged for each other one. Of the sets
     that remain, of which nothing can be left out, the fastest is chosen whose whole picture, rendered by its own program,
     meets the tolerance. Where no set meets it, the same search is made for one that is as good as any. ``budget`` is in

@@ -27,6 +27,8 @@ RTOL = 1e-5
 """Relative decrease of the cost in a step below which a search ends: the pictures then differ by far less than is seen."""
 POLISHED = 2
 """Starts that are polished: those with the least error once what the model is affine in is fitted."""
+PROPOSED = 12
+"""Starts that the data suggests where there are others, at most."""
 AFFINE = ("diffuse", "specular", "share", "scatter", "retro")
 """Parameters that such a refit takes: the model is affine in each of them while the others are held."""
 
@@ -87,15 +89,17 @@ class Screen:
         self.specs = {p.name: p for p in parameters_of(self.cls)}
 
     def fit(self, effects: Iterable[str], near: Sequence[Fitted] = ()) -> Fitted:
-        """Fit a set of effects from where fits of smaller or larger sets ended, or from what the data suggests.
+        """Fit a set of effects from where fits of smaller or larger sets ended, and, where those lead to a model that
+        differs by more than its values, from what the data suggests.
 
         The error is no larger than that of a fit in ``near`` whose effects are among these and need no switch.
         """
         names = in_order(effects)
-        if near:
-            begin = [v for fitted in near for v in self._beside(names, fitted)]
-        else:
-            begin = [self._whole(names, v) for v in starts(compose(*names), self.summary, 0)]
+        begin = [v for fitted in near for v in self._beside(names, fitted)]
+        if not any(self._nested(names, fitted) for fitted in near):
+            proposed = list(starts(compose(*names), self.summary, 0))
+            fewer = proposed[:: -(-len(proposed) // PROPOSED)] if near else proposed
+            begin += [self._whole(names, v) for v in fewer]
         free = self._free(names)
         ends = sorted((self._begun(self._vector(v), free) for v in begin), key=lambda start: start.promise)
         cost, x = min((self._polished(start, free) for start in ends[:POLISHED]), key=lambda end: end[0])
@@ -122,6 +126,10 @@ class Screen:
                 assert found is not None
                 full = found
         return full
+
+    def _nested(self, names: tuple[str, ...], near: Fitted) -> bool:
+        """Whether the effects that are switched are the same."""
+        return {n for n in names if n in self.switches} == {n for n in near.effects if n in self.switches}
 
     def _neutral(self, names: tuple[str, ...], fitted: Fitted) -> Values:
         """The values of a fit at which further effects do nothing, where there are such values."""
