@@ -134,7 +134,7 @@ def ranking(c: Comparison) -> list[str]:
     ]
     for k, m in enumerate(c.ranked, 1):
         mine = c.of(m)
-        typical = ["–" if np.isnan(t) else f"{t:.2f}" for t in (c.typical(m, loss) for loss in LOSSES)]
+        typical = ["-" if np.isnan(t) else f"{t:.2f}" for t in (c.typical(m, loss) for loss in LOSSES)]
         bent = sum(_bent(m, r) for r in mine) / len(mine)
         converged = sum(r["converged"] for r in mine)
         seconds = np.quantile([r["seconds"] for r in mine], 0.25)
@@ -169,8 +169,8 @@ def advice(c: Comparison, kind: str) -> list[str]:
     if cheap:
         m = cheap[0]
         words.append(
-            f"Of the models that cost less than {CHEAPER} of its {c.cost[best]:.0f} ns, `{m}` ({c.cost[m]:.0f} ns) loses least: "
-            f"{c.typical(m, loss, kind):.2f}."
+            f"Of the models that cost less than {CHEAPER} of its {c.cost[best]:.0f} ns, `{m}` ({c.cost[m]:.0f} ns) loses "
+            f"least: {c.typical(m, loss, kind):.2f}."
         )
     for other in LOSSES[1:]:
         m = min((m for m in able if not np.isnan(c.typical(m, other, kind))), key=lambda m: c.typical(m, other, kind))
