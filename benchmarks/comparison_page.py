@@ -149,7 +149,7 @@ def advice(c: Comparison, kind: str) -> list[str]:
     """Which model to use for a kind of material, in words."""
     loss = LOSSES[0]
     members = [m for m in c.materials if KIND.get(m) == kind]
-    able = [m for m in c.models if m not in SAME_AS and not np.isnan(c.typical(m, loss, kind))]
+    able = [m for m in c.models if m not in SAME_AS and np.isfinite(c.over_best(m, None, kind)).all()]
     by_error = sorted(able, key=lambda m: c.typical(m, loss, kind))
     best, *others = by_error
     lead = c.typical(best, loss, kind)
@@ -173,7 +173,7 @@ def advice(c: Comparison, kind: str) -> list[str]:
             f"least: {c.typical(m, loss, kind):.2f}."
         )
     for other in LOSSES[1:]:
-        m = min((m for m in able if not np.isnan(c.typical(m, other, kind))), key=lambda m: c.typical(m, other, kind))
+        m = min(able, key=lambda m: c.typical(m, other, kind))
         value, its = c.typical(m, other, kind), c.typical(best, other, kind)
         leads = f"leads too ({value:.2f})" if m == best else f"leads ({value:.2f}; `{best}` {its:.2f})"
         words.append(f"Fitted and judged under `{other}`, `{m}` {leads}.")

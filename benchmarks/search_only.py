@@ -83,7 +83,9 @@ def search(
 
 def _parameters(f: Found) -> list[dict[str, float]]:
     """Parameters of each channel of an optimum."""
-    own, shared = f.problem.chart.split(np.asarray(f.minimum.x), f.problem.channels)
+    # a bound is reached by adding the step that leads to it, and so to the last bit only
+    x = np.clip(f.minimum.x, f.box.lower, f.box.upper)
+    own, shared = f.problem.chart.split(x, f.problem.channels)
     return [{n: float(v) for n, v in f.problem.chart.parameters(o, shared).items()} for o in own]
 
 
