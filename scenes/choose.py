@@ -223,6 +223,8 @@ class _Search:
             if best.fit_error > (1 - STALLED) * here.fit_error:
                 break
             here = best
+            if self.good(here):  # another one of as many effects may meet it, too, and cost less
+                _ = [self.good(t) for t in wider]
         return here
 
     def downwards(self, top: Tried) -> None:
