@@ -191,13 +191,22 @@ def minimise(
     end = solution.state.f_info
     columns = end.jac.as_matrix()
     gradient, cost = columns.T @ end.residual, jnp.sum(end.residual**2)
-    x = solution.value
+    x = jnp.where(box.free, _on_bound(solution.value, box), solution.value)
     outward = ((x <= box.lower) & (gradient > 0)) | ((x >= box.upper) & (gradient < 0))
     size = jnp.sum(columns**2, 0) * cost
     moves = box.free & ~outward & (size > 0)
     cosine = jnp.where(moves, jnp.abs(gradient) / jnp.sqrt(jnp.where(moves, size, 1.0)), 0.0)
     stopped = solution.result == optx.RESULTS.successful
     return Minimum(x, cost, jnp.max(cosine, initial=0.0), solution.stats["num_steps"], stopped, _scale(columns, x))
+
+
+def _on_bound(x: Vector, box: Box) -> Vector:
+    """A step to a bound, added to where it began, may end a rounding before or beyond it: there x is the bound
+    (tests/test_solver.py::test_ends_in_its_box).
+    """
+    for bound in (box.lower, box.upper):
+        x = jnp.where(jnp.isfinite(bound) & (jnp.abs(x - bound) <= 1e-15 * jnp.abs(bound)), bound, x)
+    return x
 
 
 def _scale(columns: Array, x: Vector) -> Array:

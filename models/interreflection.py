@@ -60,7 +60,8 @@ class MissingEnergy(eqx.Module):
             facets = ndf.GGX(jnp.maximum(facets.alpha, least))
         lobe = facets if isinstance(facets, ndf.GTR) else _GGX(facets.alpha)
         nodes, matrix = _interpolation()
-        a = jnp.minimum(1, 2 * averted_area(facets, jnp.asarray(1e-4, dtype)))
+        # Guard: of a lobe without a tail nothing faces away near grazing: 0/0 (tests/test_effects.py::test_narrow_lobes).
+        a = jnp.clip(2 * averted_area(facets, jnp.asarray(1e-4, dtype)), least, 1)
         psi = (1 - nodes**2) * (np.pi / 2)
         sin_psi, cos_psi = (jnp.asarray(f(psi), dtype) for f in (np.sin, np.cos))
         norm = jnp.sqrt(sin_psi**2 + a**2 * cos_psi**2)

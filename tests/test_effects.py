@@ -463,6 +463,7 @@ def test_narrow_lobes():
     assert all(np.isfinite(a).all() for a in jax.tree.leaves(single))
     with jax.enable_x64(True):
         double = every(returned)(*(jnp.asarray(a) for a in (widths, tails, *ends)))
+    assert np.isfinite(double).all()
     seen = np.asarray(double) > 1e-2  # below, what is missing is close to the rounding of 1
     wide = (widths >= 1e-2)[:, None] & seen
     assert wide.sum() > 40

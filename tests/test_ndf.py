@@ -200,7 +200,7 @@ def test_shares_of_gtr():
 
 def test_quantiles_of_gtr_at_both_ends():
     """Finite, with finite derivatives, wherever next to nothing of the lobe is left on either side."""
-    ends = np.array([(0.0, 1.0), (1e-30, 1.0), (0.5, 0.5), (1.0, 1e-12), (1.0, 1e-30)])
+    ends = np.array([(0.0, 1.0), (1e-30, 1.0), (0.5, 0.5), (1.0, 1e-12), (1.0, 1e-30), (1.0, 0.0)])
     for dtype in (np.float64, np.float32):
         with jax.enable_x64(dtype is np.float64):
             slopes = jax.jacrev(lambda p, s: jnp.stack(ndf.GTR(p[0], p[1]).quantile(s[0], s[1])), (0, 1))

@@ -267,6 +267,15 @@ def test_what_is_not_free_does_not_move():
     assert float(end.optimality) < 1e-8
 
 
+def test_ends_in_its_box():
+    """On the bound itself, to the bit, though the last step is added to where it began: what lies beyond is no parameter."""
+    rng = np.random.default_rng(0)
+    upper = jnp.asarray(rng.uniform(0.1, 2, (300, 1)))
+    begin = upper * rng.uniform(-1, 1, (300, 1))
+    ends = jax.vmap(lambda u, x: solve(lambda y: y - 10, x, Box(-u, u, jnp.ones(1, bool))).x)(upper, begin)
+    np.testing.assert_array_equal(ends, upper)
+
+
 def test_a_parameter_without_effect_stays():
     end = solve(lambda x: rosenbrock(x[:2]) + 0 * x[2], jnp.array([-1.2, 1.0, 7.0]), box([-INF] * 3, [INF] * 3))
     np.testing.assert_allclose(end.x, [1, 1, 7], rtol=1e-9)

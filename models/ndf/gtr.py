@@ -81,7 +81,11 @@ class GTR(eqx.Module):
         # Guard: the logarithm of what is left of 1 + z where it cancels, and 0/0 where it does not
         # (tests/test_ndf.py::test_quantiles_of_gtr_at_both_ends).
         near = below * expm1_ratio(e * m) * log1p_ratio(jnp.where(far, 0, z))
-        r = jnp.where(far, jnp.log(above + below * jnp.exp(e * m)) / jnp.where(far, e * m, 1), near)
+        # Guard: nothing is left of 1 + z at the end of a range where e^(e M) is below the smallest number, and there r is 1
+        # (tests/test_ndf.py::test_quantiles_of_gtr_at_both_ends).
+        left = above + below * jnp.exp(e * m)
+        end = left == 0
+        r = jnp.where(far, jnp.where(end, 1, jnp.log(jnp.where(end, 1, left)) / jnp.where(far, e * m, 1)), near)
         u = r * expm1_ratio(r * m) / expm1_ratio(m)
         v = (1 - r) * jnp.exp(r * m) * expm1_ratio((1 - r) * m) / expm1_ratio(m)
         return jnp.where(narrow, u, v), jnp.where(narrow, v, u)
