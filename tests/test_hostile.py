@@ -166,8 +166,8 @@ def test_start_at_every_corner(model):
         fit = brdfit.fit(table, model, start=corner)
         check(fit)
         assert fit.converged, (corner, fit.reason)
-        # one more start never makes it worse (up to where the search stops)
-        assert fit.errors["log"] <= plain.errors["log"] * (1 + 1e-6), corner
+        # one more start never makes it worse: up to where the search stops, and to rounding where the fit is exact
+        assert fit.errors["log"] <= plain.errors["log"] * (1 + 1e-6) + 1e-14, corner
 
 
 @pytest.mark.parametrize("model", FIVE)
