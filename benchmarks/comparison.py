@@ -8,7 +8,6 @@ bars (search_only.py). Finished fits are kept as lines of JSON, with their param
 
 from __future__ import annotations
 
-import argparse
 import json
 import os
 import sys
@@ -18,6 +17,7 @@ from pathlib import Path
 from typing import Any
 
 import brdfit
+import kept
 import numpy as np
 from brdfit.fitting.effort import Effort
 from brdfit.models import MODELS, parameter_values
@@ -57,7 +57,7 @@ def run(tables: list[Path], keep: Path) -> tuple[list[Row], float]:
 
     Those of costly models come last, and tables in an order of which any first few are spread over all.
     """
-    rows = [json.loads(line) for line in keep.read_text(encoding="utf-8").splitlines()] if keep.exists() else []
+    rows = kept.rows(keep)
     done = {(r["material"], r["model"], r["loss"]) for r in rows}
     tables = [tables[i] for i in np.argsort(np.arange(len(tables)) * 0.618034 % 1)]
     begin = time.perf_counter()
@@ -82,17 +82,11 @@ def run(tables: list[Path], keep: Path) -> tuple[list[Row], float]:
 
 def main() -> None:
     """Parse, fit what is missing, write."""
-    parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
-    parser.add_argument("tables", type=Path)
-    parser.add_argument("--every", type=int, default=1, help="take every N-th table")
-    parser.add_argument("--keep", type=Path, required=True, help="finished fits, lines of JSON")
-    parser.add_argument("--out", type=Path, required=True)
-    args = parser.parse_args()
-    tables = sorted(args.tables.glob("*.binary"))[:: args.every]
+    args = kept.arguments(__doc__)
+    tables = args.tables
     rows, took = run(tables, args.keep)
     names = {p.stem for p in tables}
-    every = f" --every {args.every}" if args.every > 1 else ""
-    command = f"python benchmarks/comparison.py TABLES --keep comparison.jsonl --out docs/comparison.md{every}"
+    command = kept.command("comparison", "comparison", args.every)
     settings = (
         f"{USUAL.starts} starts polished on the compressed table, to a relative decrease of the cost of {USUAL.rtol:g}; for "
         f"{', '.join(f'`{m}`' for m in EFFORT)}, whose passes take longest, {COSTLY.starts} of half as many shapes, to "

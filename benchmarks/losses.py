@@ -9,7 +9,6 @@ CIEDE2000 of the sphere that reports render. Finished fits are kept as lines of 
 
 from __future__ import annotations
 
-import argparse
 import json
 import os
 import platform
@@ -20,6 +19,7 @@ from pathlib import Path
 from typing import Any
 
 import brdfit
+import kept
 import numpy as np
 from brdfit.fitting import LOSSES
 from brdfit.reports.evaluate import evaluate
@@ -140,22 +140,16 @@ def page(rows: list[Row], command: str) -> str:
 
 def main() -> None:
     """Parse, fit what is missing, write."""
-    parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
-    parser.add_argument("tables", type=Path)
-    parser.add_argument("--every", type=int, default=1, help="take every N-th table")
-    parser.add_argument("--keep", type=Path, required=True, help="finished fits, lines of JSON")
-    parser.add_argument("--out", type=Path, required=True)
-    args = parser.parse_args()
-    rows = [json.loads(line) for line in args.keep.read_text().splitlines()] if args.keep.exists() else []
-    tables = sorted(args.tables.glob("*.binary"))[:: args.every]
+    args = kept.arguments(__doc__)
+    rows = kept.rows(args.keep)
+    tables = args.tables
     for k, path in enumerate(tables):
         if not any(r["material"] == path.stem for r in rows):
             rows += (new := list(measured(path)))
             with args.keep.open("a") as file:
                 file.writelines(json.dumps(r) + "\n" for r in new)
         print(f"{k + 1}/{len(tables)} {path.stem}", file=sys.stderr, flush=True)
-    every = f" --every {args.every}" if args.every > 1 else ""
-    command = f"python benchmarks/losses.py TABLES --keep losses.jsonl --out docs/losses.md{every}"
+    command = kept.command("losses", "losses", args.every)
     args.out.write_text(page([r for r in rows if r["material"] in {p.stem for p in tables}], command), encoding="utf-8")
     print(args.out)
 

@@ -10,7 +10,6 @@ interrupted run goes on from them.
 
 from __future__ import annotations
 
-import argparse
 import json
 import os
 import platform
@@ -25,6 +24,7 @@ from typing import Any
 
 import brdfit
 import jax
+import kept
 import numpy as np
 from brdfit.data import forms, preset, published_materials
 from brdfit.data.presets import STARTS, published_sgd_smith
@@ -107,7 +107,7 @@ def outside(name: str, start: dict[str, np.ndarray]) -> list[str]:
 
 def run(tables: list[Path], keep: Path) -> list[Row]:
     """All comparisons, those that are missing made."""
-    rows = [json.loads(line) for line in keep.read_text(encoding="utf-8").splitlines()] if keep.exists() else []
+    rows = kept.rows(keep)
     done = {(r["material"], r["form"]) for r in rows}
     with ThreadPoolExecutor(os.cpu_count()) as pool, keep.open("a", encoding="utf-8") as file:
         for k, path in enumerate(tables):
@@ -234,17 +234,11 @@ def exceptions(missed: list[Row]) -> Iterator[str]:
 
 def main() -> None:
     """Parse, fit what is missing, write."""
-    parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
-    parser.add_argument("tables", type=Path)
-    parser.add_argument("--every", type=int, default=1, help="take every N-th table")
-    parser.add_argument("--keep", type=Path, required=True, help="finished fits, lines of JSON")
-    parser.add_argument("--out", type=Path, required=True)
-    args = parser.parse_args()
-    tables = sorted(args.tables.glob("*.binary"))[:: args.every]
+    args = kept.arguments(__doc__)
+    tables = args.tables
     rows = run(tables, args.keep)
     names = {p.stem for p in tables}
-    every = f" --every {args.every}" if args.every > 1 else ""
-    command = f"python benchmarks/published.py TABLES --keep published.jsonl --out docs/published.md{every}"
+    command = kept.command("published", "published", args.every)
     args.out.write_text(page([r for r in rows if r["material"] in names], lengths(tables), command), encoding="utf-8")
     print(args.out)
 

@@ -11,7 +11,6 @@ picture within the tolerance; any other effect is invisible. The right choice ho
 
 from __future__ import annotations
 
-import argparse
 import json
 import os
 import platform
@@ -21,6 +20,7 @@ from pathlib import Path
 from typing import Any
 
 import brdfit
+import kept
 import numpy as np
 from brdfit.data import synthetic
 from brdfit.models.effects import EFFECTS
@@ -233,15 +233,10 @@ def real_part(rows: list[Row]) -> list[str]:
 
 def main() -> None:
     """Parse, study what is missing, write."""
-    parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
-    parser.add_argument("tables", type=Path)
-    parser.add_argument("--every", type=int, default=1, help="take every N-th table")
-    parser.add_argument("--keep", type=Path, required=True, help="finished studies, lines of JSON")
-    parser.add_argument("--out", type=Path, required=True)
-    args = parser.parse_args()
-    rows = [json.loads(line) for line in args.keep.read_text().splitlines()] if args.keep.exists() else []
+    args = kept.arguments(__doc__)
+    rows = kept.rows(args.keep)
     sources: list[tuple[str, Any]] = [(t["name"], t) for t in TRUTHS]
-    sources += [(path.stem, path) for path in sorted(args.tables.glob("*.binary"))[:: args.every]]
+    sources += [(path.stem, path) for path in args.tables]
     for k, (name, source) in enumerate(sources):
         done = {r["scene"] for r in rows if r["material"] == name}
         missing = [scene for scene in SCENES if scene not in done]
@@ -252,8 +247,7 @@ def main() -> None:
             with args.keep.open("a") as file:
                 file.write(json.dumps(rows[-1]) + "\n")
         print(f"{k + 1}/{len(sources)} {name}", file=sys.stderr, flush=True)
-    every = f" --every {args.every}" if args.every > 1 else ""
-    command = f"python benchmarks/scenes.py TABLES --keep scenes.jsonl --out docs/scenes_measured.md{every}"
+    command = kept.command("scenes", "scenes_measured", args.every)
     args.out.write_text(page([r for r in rows if r["material"] in dict(sources)], command), encoding="utf-8")
     print(args.out)
 
