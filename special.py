@@ -61,7 +61,7 @@ def root(square: Scalars) -> Scalars:
     """The root of a square, not below the eighth root of the smallest number of its precision.
 
     Guard: the root has no derivative at 0, and quotients of sines and angles are 0/0 there; the eighth power, as in
-    derivatives of products of quotients, can still be divided by (tests/test_empirical.py::test_finite).
+    derivatives of products of quotients, can still be divided by (tests/test_models.py::test_finite).
     """
     return jnp.sqrt(jnp.maximum(square, float(np.finfo(square.dtype).tiny) ** 0.25))
 

@@ -122,7 +122,7 @@ class BRDF(eqx.Module):
         wi, wo = jnp.broadcast_arrays(jnp.asarray(wi), jnp.asarray(wo))
         above = (wi[..., 2] > 0) & (wo[..., 2] > 0)
         # Guard the input: below the horizon models divide by zero or take roots of negative numbers, and 0 * inf = NaN
-        # in the gradient (tests/test_models.py::test_below_the_horizon).
+        # in the gradient (tests/test_models.py::test_finite).
         normal = jnp.zeros(3, wi.dtype).at[2].set(1)
         wi, wo = (jnp.where(above[..., None], w, normal) for w in (wi, wo))
         single = jnp.result_type(wi, *jax.tree.leaves(self)) == jnp.float32

@@ -77,18 +77,18 @@ def _first(g: Array, t: Array, peak: Array, width: Array) -> _Sums:
 
 def _around(g: Array, t: Array, peak: Array, width: Array) -> _Sums:
     """Terms to both sides of the largest one."""
-    # Guard: a divisor, where the sum is taken from the first term (tests/test_empirical.py::test_finite).
+    # Guard: a divisor, where the sum is taken from the first term (tests/test_models.py::test_finite).
     p = jnp.maximum(peak, FEW)
     q = (g - p) / p
     near = jnp.abs(q) < 0.5
-    # Guard: the logarithm of 0, which the branch not taken would see (tests/test_empirical.py::test_finite).
+    # Guard: the logarithm of 0, which the branch not taken would see (tests/test_models.py::test_finite).
     log = jnp.where(near, jnp.log1p(jnp.where(near, q, 0)), jnp.log(jnp.where(near, 1, g / p)))
     # m! by Stirling: m ln g - g - ln m! = m (1 + ln(g/m)) - g - ln(2 pi m)/2 - rest
     highest = -p * (q - log) - t / p - 1.5 * jnp.log(p) - np.log(2 * np.pi) / 2
     here = (peak > FEW) & (highest > NOTHING)
     count = jnp.where(jnp.any(here), BEFORE + BEHIND + 1, 0)
     spacing, lowest, rise, past, nearer = width / (SPACING * p), 3 / p - 1, 1 + log, t / p, 1 / p
-    # Guard: p/g overflows where g is tiny and the sum is 0 (tests/test_empirical.py::test_series).
+    # Guard: p/g overflows where g is tiny and the sum is 0 (tests/test_waves.py::test_series).
     relative = jnp.where(here, p / jnp.where(here, g, 1), 0)
 
     def step(k: Array, sums: _Sums) -> _Sums:

@@ -23,6 +23,6 @@ def mirror_deficit(g: Geometry) -> Float[Array, "..."]:
 def cosine_power(deficit: Float[Array, "..."], exponent: Float[Array, ""]) -> Float[Array, "..."]:
     """x^exponent for the cosine x = 1 - deficit; 0, with zero derivative, where x <= 0."""
     positive = deficit < 1
-    # Guard: the logarithm of what is not positive (tests/test_empirical.py::test_finite).
+    # Guard: the logarithm of what is not positive (tests/test_models.py::test_finite).
     x = jnp.log1p(-jnp.where(positive, deficit, 0))
     return jnp.where(positive, jnp.exp(exponent * x), 0)

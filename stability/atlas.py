@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import multiprocessing
 from collections.abc import Callable, Sequence
-from concurrent.futures import ProcessPoolExecutor
+from concurrent.futures import ProcessPoolExecutor, ThreadPoolExecutor
 from dataclasses import dataclass, replace
 from typing import Any
 
@@ -75,18 +75,23 @@ def survey(draws: int | None = None, say: Callable[[str], None] = lambda text: N
     plans = {part: _plan(part) for part in PARTS}
     with ProcessPoolExecutor(2, multiprocessing.get_context("spawn")) as pool:
         waiting = [(keys, pool.submit(_tabulate, jobs)) for keys, jobs in _bundles(plans)]
-        # while the references are summed, random draws are made and float32 is measured against float64
-        partial = {}
-        for part in PARTS:
+        found: dict[Any, Any] = {}
+
+        def draw(part: Part) -> list[Record]:
             say(f"{part.group}: {part.name}")
             count = draws or (DRAWS_OF_INTEGRALS if part.integral else DRAWS)
-            for precision, dtype in PRECISIONS.items():
-                partial[part, precision] = _finite_record(part, precision, not_finite(part, count, dtype), count)
-        found: dict[Any, Any] = {}
-        for keys, future in waiting:
-            found.update(zip(keys, future.result(), strict=True))
-            say(f"references: {len(found)}")
-    return [_measured(partial[part, precision], part, plans[part], found) for part in PARTS for precision in PRECISIONS]
+            return [_finite_record(part, p, not_finite(part, count, dtype), count) for p, dtype in PRECISIONS.items()]
+
+        def measure(records: list[Record], part: Part) -> list[Record]:
+            return [_measured(record, part, plans[part], found) for record in records]
+
+        # while the references are summed, programs are compiled, most of the work, and random draws made
+        with ThreadPoolExecutor(2) as threads:
+            drawn = list(threads.map(draw, PARTS))
+            for keys, future in waiting:
+                found.update(zip(keys, future.result(), strict=True))
+                say(f"references: {len(found)}")
+            return [record for records in threads.map(measure, drawn, PARTS) for record in records]
 
 
 def _plan(part: Part) -> list[tuple[str, Reals, Reals]]:
@@ -99,7 +104,7 @@ def _bundles(plans: dict[Part, list[tuple[str, Reals, Reals]]]) -> list[tuple[li
     """Reference jobs with their keys, the slow ones first; those that share integrals go to one process together."""
     bundles: dict[Any, tuple[list[Any], Points]] = {}
     for part, maps in plans.items():
-        shape = part.name.removeprefix("Smith, ")
+        shape = part.name.removeprefix("Smith, ").lower()
         for varied, _, points in maps:
             for row, line in enumerate(points):
                 where = (shape, varied, row) if part.integral and varied in ("alpha", "gamma", "p") else (part, varied)

@@ -2,11 +2,16 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+import math
+from collections.abc import Iterable
+from dataclasses import dataclass, replace
+from typing import Any
 
 import numpy as np
 from jaxtyping import ArrayLike
 from numpy.typing import NDArray
+
+from ..models import Parameter
 
 Reals = NDArray[np.float64]
 
@@ -43,45 +48,48 @@ class Range:
         return np.clip(np.where(kind < 0.6, values, np.where(kind < 0.8, ends, near)), least, self.high)
 
 
-_ALBEDO = Range(0, 1, 0.1, log=False)
-_SCALE = Range(0, 1, 0.6, log=False)
-_WIDTH = Range(1e-4, 30, 0.15)
-_EXPONENT = Range(1e-3, 1e7, 100, special=(0.0,))
-_GTR = {"alpha": Range(1e-9, 10, 0.2, special=(1.0,)), "gamma": Range(0.01, 1e7, 1.6, special=(1.0,))}
-_SGD = {"alpha": Range(1e-7, 30, 0.05), "p": Range(-10, 60, 0.6, log=False, special=(0.0, 1.0, 2.0, 7.0))}
-_ABC = {"b": Range(1e-8, 1e9, 200), "c": Range(1e-3, 1e4, 1.3, special=(0.0, 1.0, 2.0))}
-_IOR = Range(1, 1001, 1.5, special=(1.0,))
-_F0, _F1 = Range(0.05, 1, 0.05, log=False), Range(-0.04, 0.04, 0.01, log=False)
-"""F_sgd crosses zero for larger f1, and there no digit of the value is left by subtraction."""
-
-PARAMETERS: dict[str, dict[str, Range]] = {
-    "Lambert": {"diffuse": _ALBEDO},
-    "GTR": {"diffuse": _ALBEDO, "specular": _SCALE, **_GTR},
-    "SGD": {"diffuse": _ALBEDO, "specular": _SCALE, **_SGD, "f0": _F0, "f1": _F1},
-    "ABC": {"diffuse": _ALBEDO, "specular": _SCALE, **_ABC, "ior": _IOR},
-    "Ward": {"diffuse": _ALBEDO, "specular": _SCALE, "alpha": _WIDTH},
-    "WardAnisotropic": {"diffuse": _ALBEDO, "specular": _SCALE, "alpha_x": _WIDTH, "alpha_y": _WIDTH},
-    "AshikhminShirley": {"diffuse": _ALBEDO, "specular": _SCALE, "exponent": _EXPONENT},
-    "AshikhminShirleyAnisotropic": {
-        "diffuse": _ALBEDO,
-        "specular": _SCALE,
-        "exponent_x": _EXPONENT,
-        "exponent_y": _EXPONENT,
+_TILT = {"low": -1.5, "high": 1.5}
+CHANGES: dict[str, dict[str, dict[str, Any]]] = {
+    "gtr": {"alpha": {"special": (1.0,)}, "gamma": {"special": (1.0,)}},
+    "sgd": {
+        "p": {"special": (0.0, 1.0, 2.0, 7.0)},
+        # F_sgd crosses zero for larger f1, and there no digit of the value is left by subtraction
+        "f0": {"low": 0.05, "high": 1, "usual": 0.05},
+        "f1": {"low": -0.04, "high": 0.04, "usual": 0.01},
     },
+    "abc": {"b": {"low": 1e-8}, "c": {"special": (0.0, 1.0, 2.0)}},
+    "epd": {"p": {"special": (1.0,)}},
+    "student_t": {"gamma": {"special": (2.0,)}},
+    # off the axis of Phong's lobe, where the largest coefficient changes; and at a tilt of 90 degrees the cosine of a lobe
+    # seen at normal incidence is 0 but for rounding
+    "lafortune": {"tilt": {**_TILT, "usual": 0.9}},
+    "lafortune2": {"tilt_1": {**_TILT, "usual": 0.9}, "tilt_2": {**_TILT, "usual": -0.7}},
+    "lafortune3": {"tilt_1": {**_TILT, "usual": 0.9}, "tilt_2": {**_TILT, "usual": -0.7}, "tilt_3": {**_TILT, "usual": 0.5}},
 }
-"""By class of model."""
+"""By model or block and parameter: in what its range differs from what is declared, and its removable singularities."""
 
-SHAPES: dict[str, dict[str, Range]] = {
-    name: {k: r for k, r in ranges.items() if k not in ("diffuse", "specular", "ior", "f0", "f1")}
-    for name, ranges in PARAMETERS.items()
-}
-"""The parameters of a model's normal distribution."""
 
-FRESNEL: dict[str, dict[str, Range]] = {
-    "dielectric": {"ior": _IOR},
-    "schlick": {"f0": _F0},
-    "sgd_fresnel": {"f0": _F0, "f1": _F1},
-}
+def range_of(p: Parameter, owner: str) -> Range:
+    """The range of a parameter of a model or block: the box that fits search and the closed ends of where it is valid.
+
+    Scales, which have no upper end, go to 1. The usual value is the default, or the middle where that is an end.
+    """
+    low, high = p.search
+    special: tuple[float, ...] = ()
+    if p.valid.upper in p.valid:
+        high = p.valid.upper
+    if not math.isfinite(high):
+        high = 1.0
+    if p.valid.lower in p.valid and p.valid.lower < low:
+        low, special = (low, (p.valid.lower,)) if p.log else (p.valid.lower, ())
+    middle = math.sqrt(low * high) if p.log else (low + high) / 2
+    found = Range(low, high, p.default if low < p.default < high else middle, p.log, special)
+    return replace(found, **CHANGES.get(owner, {}).get(p.name, {}))
+
+
+def ranges_of(parameters: Iterable[Parameter], owner: str) -> dict[str, Range]:
+    """Ranges by name."""
+    return {p.name: range_of(p, owner) for p in parameters}
 
 
 def unit(theta: ArrayLike, phi: ArrayLike) -> Reals:
@@ -109,4 +117,4 @@ def draw(ranges: dict[str, Range], rng: np.random.Generator, n: int) -> Reals:
     return np.array([r.draw(rng, n) for r in ranges.values()]).reshape(len(ranges), n).T
 
 
-__all__ = ["FRESNEL", "GRAZING", "NEAR", "PARAMETERS", "SHAPES", "Range", "draw", "draw_directions", "unit"]
+__all__ = ["CHANGES", "GRAZING", "NEAR", "Range", "draw", "draw_directions", "range_of", "ranges_of", "unit"]

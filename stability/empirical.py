@@ -1,21 +1,18 @@
 """The empirical and wave-optical models in 40-digit arithmetic, transcribed from the papers, not from the code under test.
 
-Directions are normalised first: a vector rounded to length is off the unit sphere, where the formulas say nothing. So
-derivatives by a direction are tangential, as those of the code are when projected.
+Where a formula is made of other quantities than l + v, l - v, n.l and n.v, directions are normalised first: a vector rounded
+to length is off the unit sphere, where the formula says nothing.
 """
 
 from __future__ import annotations
 
 from collections.abc import Callable, Sequence
+from functools import cache
 from typing import Any
 
 from mpmath import mp, mpf
 
-from . import microfacets
-
-DIGITS = 40
-DIFFERENCE_DIGITS = 75
-STEP = mpf(10) ** -30
+from . import microfacets, oracle
 
 Vector = Sequence[Any]
 
@@ -32,6 +29,11 @@ def _dot(a: Vector, b: Vector) -> Any:
 
 def _half(l: Vector, v: Vector) -> list[Any]:
     return unit([a + b for a, b in zip(l, v, strict=True)])
+
+
+def _cosine_d(l: Vector, v: Vector) -> Any:
+    """l.h."""
+    return mp.cos(oracle._half(l, v)[3])
 
 
 def _mirror(l: Vector) -> list[Any]:
@@ -114,7 +116,7 @@ def lafortune(l: Vector, v: Vector, diffuse: Any, **lobes: Any) -> Any:
 
 
 def _schlick_fresnel(f0: Any, l: Vector, v: Vector) -> Any:
-    return f0 + (1 - f0) * (1 - _dot(l, _half(l, v))) ** 5
+    return f0 + (1 - f0) * (1 - _cosine_d(l, v)) ** 5
 
 
 def _schlick_d(r: Any, l: Vector, v: Vector) -> Any:
@@ -153,7 +155,7 @@ def strauss(l: Vector, v: Vector, diffuse: Any, smoothness: Any, metalness: Any,
 def schwenk(l: Vector, v: Vector, diffuse: Any, specular: Any, smoothness: Any, scale: Any) -> Any:
     """Schwenk (2011), section 4.2.4, over pi."""
     h = _half(l, v)
-    js = smoothness**2 / _dot(v, h) * _schlick_fresnel(specular, l, v) * h[2] ** (2 / (1 + mpf(1) / 255 - smoothness))
+    js = smoothness**2 / _cosine_d(l, v) * _schlick_fresnel(specular, l, v) * h[2] ** (2 / (1 + mpf(1) / 255 - smoothness))
     return (diffuse + scale * js) / mp.pi
 
 
@@ -192,24 +194,39 @@ def granier_heidrich(
     return diffuse / mp.pi + specular * (exponent + 2) / (2 * mp.pi) * lobe
 
 
+@cache
+def _series_and_slopes(g: Any, t: Any) -> tuple[Any, Any, Any]:
+    """:func:`series` and its derivatives by g and t, term by term either way from the largest until they are below 1e-45."""
+    with mp.workdps(oracle.DIGITS):
+        top = max(1, int(g))
+        while mp.log(g) - mp.log(top + 1) + t / top**2 > 0:  # far out for t >> g
+            top += max(1, top // 8)
+        smallest = mpf(10) ** (-mp.dps - 5)
+        start = g**top * mp.exp(-g) / mp.factorial(top)
+        total = by_g = by_t = mpf(0)
+        for step in (1, -1):
+            m, weight, term = top, start, mp.inf
+            while m >= 1:
+                last, term = term, weight / m * mp.exp(-t / m)
+                if step == 1 or m != top:
+                    total += term
+                    by_g += term * (m - g)
+                    by_t -= term / m
+                if term < smallest * total and term < last:
+                    break
+                weight = weight * g / (m + 1) if step == 1 else weight * m / g
+                m += step
+        return total, by_g / g, by_t
+
+
 def series(g: Any, t: Any) -> Any:
-    """Sum over m >= 1 of g^m e^-g/(m! m) exp(-t/m), term by term either way from the largest until they are below 1e-45."""
-    top = max(1, int(g))
-    while mp.log(g) - mp.log(top + 1) + t / top**2 > 0:  # far out for t >> g
-        top += max(1, top // 8)
-    smallest = mpf(10) ** (-mp.dps - 5)
-    start = g**top * mp.exp(-g) / mp.factorial(top)
-    total = mpf(0)
-    for step in (1, -1):
-        m, weight, term = top, start, mp.inf
-        while m >= 1:
-            last, term = term, weight / m * mp.exp(-t / m)
-            total += term if step == 1 or m != top else 0
-            if term < smallest * total and term < last:
-                break
-            weight = weight * g / (m + 1) if step == 1 else weight * m / g
-            m += step
-    return total
+    """Sum over m >= 1 of g^m e^-g/(m! m) exp(-t/m).
+
+    Summed at the float64 numbers nearest to the arguments and carried from there to the first order, as ``oracle.smith``.
+    """
+    g0, t0 = mpf(float(g)), mpf(float(t))
+    total, by_g, by_t = _series_and_slopes(g0, t0)
+    return total + by_g * (g - g0) + by_t * (t - t0)
 
 
 def _cook(ior: Any, c: Any) -> Any:
@@ -250,7 +267,7 @@ def _effective(ki: Any, ko: Any, sigma: Any) -> Any:
 def htsg(l: Vector, v: Vector, diffuse: Any, specular: Any, ior: Any, sigma: Any, tau: Any) -> Any:
     """The two diffuse terms of He et al. (1991)."""
     (si, ki), (so, ko) = (_smith(w[2], sigma, tau) for w in (l, v))
-    f = _cook(ior, _dot(l, _half(l, v)))
+    f = _cook(ior, _cosine_d(l, v))
     return diffuse / mp.pi + specular * f * si * so * _wave(l, v, _effective(ki, ko, sigma), tau)
 
 
@@ -268,67 +285,39 @@ def stam(l: Vector, v: Vector, diffuse: Any, specular: Any, sigma: Any, tau: Any
     u2 = k**2 * ((l[0] + v[0]) ** 2 + (l[1] + v[1]) ** 2)
     spectrum = mp.pi * tau**2 * series(g, u2 * tau**2 / 4)
     factor = ((1 + _dot(l, v)) / (l[2] + v[2])) ** 2 / (l[2] * v[2])
-    return diffuse / mp.pi + specular * _cook(ior, _dot(l, _half(l, v))) * factor * spectrum
+    return diffuse / mp.pi + specular * _cook(ior, _cosine_d(l, v)) * factor * spectrum
 
 
-MODELS: dict[str, Callable[..., Any]] = {
+def _normalised(model: Callable[..., Any]) -> Callable[..., Any]:
+    return lambda l, v, **numbers: model(unit(l), unit(v), **numbers)
+
+
+_OF_UNIT_VECTORS: dict[str, Callable[..., Any]] = {
     "Phong": phong,
     "ModifiedPhong": modified_phong,
     "MaxPhong": max_phong,
-    "BlinnPhong": blinn_phong,
-    "ModifiedBlinnPhong": modified_blinn_phong,
     "OrenNayar": oren_nayar,
     "OrenNayarFull": oren_nayar_full,
     "lafortune": lafortune,
     "lafortune2": lafortune,
     "lafortune3": lafortune,
-    "Schlick": schlick,
-    "SchlickTwoLayers": schlick_two_layers,
     "Strauss": strauss,
     "Schwenk": schwenk,
     "DistributionBased": distribution_based,
     "GranierHeidrich": granier_heidrich,
     "HTSG": htsg,
     "StamDiffraction": stam,
-    **microfacets.MODELS,
 }
-"""By the name of the class under test: functions of unit vectors and parameters."""
 
+MODELS: dict[str, Callable[..., Any]] = {
+    **oracle.MODELS,
+    **microfacets.MODELS,
+    "BlinnPhong": blinn_phong,
+    "ModifiedBlinnPhong": modified_blinn_phong,
+    "Schlick": schlick,
+    "SchlickTwoLayers": schlick_two_layers,
+    **{name: _normalised(model) for name, model in _OF_UNIT_VECTORS.items()},
+}
+"""By the name of the class under test: functions of directions and, by name, parameters."""
 
-def _at(name: str, ends: Sequence[Vector], numbers: dict[str, Any]) -> Any:
-    if name in microfacets.MODELS:  # defined off the unit sphere too, by l + v and l - v
-        return MODELS[name](*ends, **numbers)
-    return MODELS[name](unit(ends[0]), unit(ends[1]), **numbers)
-
-
-def _exact(wi: Sequence[float], wo: Sequence[float]) -> list[list[Any]]:
-    return [[mpf(float(x)) for x in w] for w in (wi, wo)]
-
-
-def value(name: str, parameters: dict[str, float], wi: Sequence[float], wo: Sequence[float]) -> Any:
-    """The model's value for parameters taken as exact and directions taken as exact but for their length."""
-    with mp.workdps(DIGITS):
-        return _at(name, _exact(wi, wo), {k: mpf(float(x)) for k, x in parameters.items()})
-
-
-def gradient(name: str, parameters: dict[str, float], wi: Sequence[float], wo: Sequence[float]) -> dict[str, Any]:
-    """Derivatives by parameter, and by the components of the directions tangential to the sphere, ``wi_0`` to ``wo_2``."""
-    out = {}
-    with mp.workdps(DIFFERENCE_DIGITS):
-        numbers, ends = {k: mpf(float(x)) for k, x in parameters.items()}, _exact(wi, wo)
-        for key, x in numbers.items():
-            step = STEP * (abs(x) or 1)
-            high, low = (_at(name, ends, {**numbers, key: x + s}) for s in (step, -step))
-            out[key] = (high - low) / (2 * step)
-        for side, label in enumerate(("wi", "wo")):
-            for axis in range(3):
-                moved = []
-                for s in (STEP, -STEP):
-                    pair = [list(e) for e in ends]
-                    pair[side][axis] += s
-                    moved.append(_at(name, pair, numbers))
-                out[f"{label}_{axis}"] = (moved[0] - moved[1]) / (2 * STEP)
-    return out
-
-
-__all__ = ["DIGITS", "MODELS", "gradient", "htsg_mirror", "mp", "mpf", "series", "unit", "value"]
+__all__ = ["MODELS", "htsg_mirror", "mp", "mpf", "series", "unit"]

@@ -11,7 +11,8 @@ import jax.numpy as jnp
 import numpy as np
 from numpy.typing import NDArray
 
-from .parts import Part
+from . import oracle
+from .parts import DIRECTIONS, Part
 
 Reals = NDArray[np.float64]
 BATCH = 512
@@ -27,12 +28,16 @@ LARGEST_SLOPE = 1e36
 """Slopes beyond are held finite in float32 (see ``special.hold_slopes``) and have no digits to count."""
 
 
+QUICKLY = {"xla_backend_optimization_level": 0}
+"""Programs compile in a third of the time so, and most of the time is that."""
+
+
 @cache
 def _compiled(part: Part) -> Callable[[Any], Any]:
     """Values and slopes: backwards for models, as a fit takes them, and forwards for parts."""
     if part.group == "models":
-        return jax.jit(jax.vmap(jax.value_and_grad(part.program)))
-    return jax.jit(jax.vmap(lambda x: (part.program(x), jax.jacfwd(part.program)(x))))
+        return jax.jit(jax.vmap(jax.value_and_grad(part.program)), compiler_options=QUICKLY)
+    return jax.jit(jax.vmap(lambda x: (part.program(x), jax.jacfwd(part.program)(x))), compiler_options=QUICKLY)
 
 
 def evaluate(part: Part, points: Reals, dtype: Any = np.float64) -> tuple[Reals, Reals]:
@@ -49,6 +54,19 @@ def evaluate(part: Part, points: Reals, dtype: Any = np.float64) -> tuple[Reals,
     return values, slopes
 
 
+def tangential(part: Part, points: Reals, slopes: Reals) -> Reals:
+    """Slopes ``[n, arguments]`` with those by directions projected onto the tangent planes, where the reference
+    is another function than the program off the sphere.
+    """
+    if part.extra != DIRECTIONS or part.name in oracle.MODELS:
+        return slopes
+    out = slopes.copy()
+    for end in (slice(-6, -3), slice(-3, None)):
+        w = points[:, end] / np.linalg.norm(points[:, end], axis=1, keepdims=True)
+        out[:, end] -= w * (w * slopes[:, end]).sum(1, keepdims=True)
+    return out
+
+
 def errors(
     part: Part, points: Reals, got: tuple[Reals, Reals], want: tuple[Reals, Reals], dtype: Any
 ) -> tuple[Reals, Reals]:
@@ -59,13 +77,15 @@ def errors(
     """
     smallest = SMALLEST_SINGLE if dtype is np.float32 else part.smallest
     value = np.abs(got[0] - want[0]) / (np.abs(want[0]) + smallest[0])
+    got_slope, want_slope = got[1], want[1]
+    if dtype is not np.float32:  # whose reference is the same formula
+        got_slope, want_slope = (tangential(part, points, s) for s in (got_slope, want_slope))
     size = np.where(np.abs(points) < 1e-100, 1, np.abs(points))
     size[:, np.asarray(part.cosines, int)] = 1
     natural = np.abs(want[0])[:, None] / size
-    slope = np.abs(got[1] - want[1]) / (np.maximum(np.abs(want[1]), natural) + smallest[1])
-    if part.kinked:
-        level = np.abs(points[:, part.arguments.index("wi_z")] - points[:, part.arguments.index("wo_z")]) < 1e-6
-        slope[np.ix_(level, np.asarray(part.cosines, int))] = np.nan
+    slope = np.abs(got_slope - want_slope) / (np.maximum(np.abs(want_slope), natural) + smallest[1])
+    if part.kink is not None:
+        slope[np.ix_(part.kink(points), np.arange(len(part.ranges), len(part.arguments)))] = np.nan
     if dtype is np.float32:
         slope[(np.abs(want[1]) > LARGEST_SLOPE).any(1)] = np.nan
     return value, slope
@@ -77,12 +97,12 @@ ROUNDINGS = 8
 
 @cache
 def _lifted(part: Part) -> Callable[[Any], Any]:
-    return jax.jit(jax.vmap(lambda y: (part.formula(y), jax.jacfwd(part.formula)(y))))
+    return jax.jit(jax.vmap(lambda y: (part.formula(y), jax.jacfwd(part.formula)(y))), compiler_options=QUICKLY)
 
 
 @cache
 def _lift(part: Part) -> Callable[[Any], Any]:
-    return jax.jit(jax.vmap(lambda x: (part.lifted(x), jax.jacfwd(part.lifted)(x))))
+    return jax.jit(jax.vmap(lambda x: (part.lifted(x), jax.jacfwd(part.lifted)(x))), compiler_options=QUICKLY)
 
 
 def moved(part: Part, points: Reals) -> tuple[Reals, Reals]:

@@ -57,7 +57,23 @@ def _epd_extent(alpha: Any, p: Any, kink: Any) -> tuple[Any, Any, Any]:
     return mp.log(alpha) - oracle.BELOW, kink, mp.log(alpha) + mp.log(80) / (2 * p)
 
 
-oracle.EXTENT[epd] = _epd_extent
+def _blinn_extent(exponent: Any, kink: Any) -> tuple[Any, Any, Any]:
+    """The same of :func:`blinn`."""
+    return -mp.log(1 + exponent) / 2 - oracle.BELOW, kink, max(0, kink) + oracle.ABOVE
+
+
+def _gaussian_extent(alpha: Any, kink: Any) -> tuple[Any, Any, Any]:
+    """The same of :func:`gaussian`."""
+    return mp.log(min(1, alpha)) - oracle.BELOW, kink, max(0, kink) + oracle.ABOVE
+
+
+oracle.EXTENT |= {epd: _epd_extent, blinn: _blinn_extent, gaussian: _gaussian_extent}
+
+
+def stretched_ggx(alpha_x: Any, alpha_y: Any, l: Vector, v: Vector) -> Any:
+    """Burley (2012), eq. 13."""
+    x, y, z, _ = oracle._half(l, v)
+    return 1 / (PI * alpha_x * alpha_y * ((x / alpha_x) ** 2 + (y / alpha_y) ** 2 + z**2) ** 2)
 
 
 def student_t(alpha: Any, gamma: Any, c: Any) -> Any:
@@ -97,7 +113,7 @@ def student_t_lambda(alpha: Any, gamma: Any, c: Any) -> Any:
 
 def epd_lambda(alpha: Any, p: Any, c: Any) -> Any:
     """Smith's integral."""
-    return 1 / oracle.masking(epd, alpha, p, c) - 1
+    return 1 / oracle.smith(epd, alpha, p, c) - 1
 
 
 def hammon(alpha: Any, l: Vector, v: Vector) -> Any:

@@ -19,8 +19,10 @@ DIFFERENCE_DIGITS = 105  # STEP costs 50, and a lobe 1e13 times the body term 13
 MANY_DIGITS = 200  # the normalisers lose up to 3 log10(1/b) + 2 log10(1/|c - 1|) digits: 24 + 100 a step beside c = 1
 
 Vector = Sequence[Any]
-Density = Callable[[Any, Any, Any], Any]
-"""Of two parameters and n.m."""
+Density = Callable[..., Any]
+"""Of its parameters and n.m."""
+Shape = tuple[Any, ...]
+"""Parameters of a density."""
 
 
 # Normal distributions: functions of n.m -------------------------------------------------------------------------------
@@ -142,19 +144,20 @@ def parted_panel(cosine: Any, k: int) -> tuple[Any, Any]:
     return parted(cosine, panel(k))
 
 
-def density_and_slopes(density: Density, p: Any, q: Any, at: Nodes) -> list[list[Any]]:
-    """D at nodes, and its derivatives by its two parameters as difference quotients."""
-    here = [density(p, q, c) for c, *_ in at]
-    steps = [STEP * (abs(x) or 1) for x in (p, q)]
-    by_p = [(density(p + steps[0], q, c) - d) / steps[0] for (c, *_), d in zip(at, here, strict=True)]
-    by_q = [(density(p, q + steps[1], c) - d) / steps[1] for (c, *_), d in zip(at, here, strict=True)]
-    return [here, by_p, by_q]
+def density_and_slopes(density: Density, shape: Shape, at: Nodes) -> list[list[Any]]:
+    """D at nodes, and its derivatives by its parameters as difference quotients."""
+    found = [[density(*shape, c) for c, *_ in at]]
+    for k, x in enumerate(shape):
+        step = STEP * (abs(x) or 1)
+        moved = *shape[:k], x + step, *shape[k + 1 :]
+        found.append([(density(*moved, c) - d) / step for (c, *_), d in zip(at, found[0], strict=True)])
+    return found
 
 
 @lru_cache(maxsize=512)  # the panels of some sets of parameters: polar angles share them
-def density_panel(density: Density, p: Any, q: Any, k: int) -> list[list[Any]]:
+def density_panel(density: Density, shape: Shape, k: int) -> list[list[Any]]:
     """:func:`density_and_slopes` for panel ``k``."""
-    return density_and_slopes(density, p, q, panel(k))
+    return density_and_slopes(density, shape, panel(k))
 
 
 def projection(at: Nodes, values: list[list[Any]]) -> list[Any]:
@@ -164,30 +167,32 @@ def projection(at: Nodes, values: list[list[Any]]) -> list[Any]:
 
 
 @lru_cache(maxsize=512)
-def projection_panel(density: Density, p: Any, q: Any, k: int) -> list[Any]:
+def projection_panel(density: Density, shape: Shape, k: int) -> list[Any]:
     """:func:`projection` for panel ``k``."""
-    return projection(panel(k), density_panel(density, p, q, k))
+    return projection(panel(k), density_panel(density, shape, k))
 
 
 @cache
-def projected_area(density: Density, p: Any, q: Any, cosine: Any) -> list[Any]:
-    """Integral of max(0, v.m) D(m) over the hemisphere of m, and its derivatives by ``p``, ``q`` and ``cosine`` = n.v < 1.
+def projected_area(density: Density, shape: Shape, cosine: Any) -> list[Any]:
+    """Integral of max(0, v.m) D(m) over the hemisphere of m, and its derivatives by the parameters of D and ``cosine`` =
+    n.v < 1.
 
     The azimuth is in closed form, the rest is summed over panels of ln tan(theta_m). The integrand has a kink of order 3/2
     at theta_m + theta_v = 90 degrees, from which panels go out anew. Derivatives are those of the integrand at its nodes.
     """
     with mp.workdps(DIFFERENCE_DIGITS):
         kink = mp.log(cosine / mp.sqrt(1 - cosine**2))
-        first, here, last = (int(mp.floor(x / PANEL)) for x in EXTENT[density](p, q, kink))
-        facing = [projection_panel(density, p, q, k) for k in range(first, min(here, last + 1))]
-        averted = [(density_panel(density, p, q, k), parted_panel(cosine, k)) for k in range(max(first, here + 2), last + 1)]
+        first, here, last = (int(mp.floor(x / PANEL)) for x in EXTENT[density](*shape, kink))
+        facing = [projection_panel(density, shape, k) for k in range(first, min(here, last + 1))]
+        beyond = range(max(first, here + 2), last + 1)
+        averted = [(density_panel(density, shape, k), parted_panel(cosine, k)) for k in beyond]
         if first - 2 < here <= last:
             before = nodes(here * PANEL, kink - here * PANEL)
-            facing.append(projection(before, density_and_slopes(density, p, q, before)))
+            facing.append(projection(before, density_and_slopes(density, shape, before)))
             half = ((here + 2) * PANEL - kink) / 2
             after = nodes(kink, half, squared=True), nodes(kink + half, half)
-            averted += [(density_and_slopes(density, p, q, at), parted(cosine, at)) for at in after]
-        mass = [mp.fsum(column) for column in zip(*facing, strict=True)] or [mpf(0)] * 3
+            averted += [(density_and_slopes(density, shape, at), parted(cosine, at)) for at in after]
+        mass = [mp.fsum(column) for column in zip(*facing, strict=True)] or [mpf(0)] * (1 + len(shape))
         area = [cosine * m + mp.fsum(mp.fdot(d[n], w) for d, (w, _) in averted) for n, m in enumerate(mass)]
         return [*area, mass[0] + mp.fsum(mp.fdot(d[0], slope) for d, (_, slope) in averted)]
 
@@ -204,29 +209,35 @@ def sgd_extent(alpha: Any, p: Any, kink: Any) -> tuple[Any, Any, Any]:
     return mp.log(alpha / mp.sqrt(alpha + abs(p) + 1)) - BELOW, kink, mp.log(alpha * 200) / 2  # e^-200 is left out
 
 
-EXTENT: dict[Density, Callable[..., tuple[Any, Any, Any]]] = {gtr: gtr_extent, sgd: sgd_extent}
+def abc_extent(b: Any, c: Any, kink: Any) -> tuple[Any, Any, Any]:
+    """The same of :func:`abc`."""
+    return -mp.log(1 + b * (1 + c)) / 2 - BELOW, kink, max(0, kink) + ABOVE
 
 
-def masking(density: Density, p: Any, q: Any, cosine: Any) -> Any:
-    """G1, the exact Smith masking of a density, n.v over the projected area.
+EXTENT: dict[Density, Callable[..., tuple[Any, Any, Any]]] = {gtr: gtr_extent, sgd: sgd_extent, abc: abc_extent}
+"""Others are added where they are defined."""
+
+
+def smith(density: Density, *arguments: Any) -> Any:
+    """G1, the exact Smith masking of a density, of its parameters and n.v: n.v over the projected area.
 
     The area is that at the float64 numbers nearest to the arguments, carried from there to the first order: what a
     difference quotient needs of steps that float64 does not see, without an integral for each.
     """
-    at = [mpf(float(x)) for x in (p, q, cosine)]
-    at[2] = min(at[2], NEXT_TO_NORMAL)
-    area, *slopes = projected_area(density, *at)
-    return cosine / (area + mp.fsum(d * (x - x0) for d, x, x0 in zip(slopes, (p, q, cosine), at, strict=True)))
+    at = [mpf(float(x)) for x in arguments]
+    at[-1] = min(at[-1], NEXT_TO_NORMAL)
+    area, *slopes = projected_area(density, tuple(at[:-1]), at[-1])
+    return arguments[-1] / (area + mp.fsum(d * (x - x0) for d, x, x0 in zip(slopes, arguments, at, strict=True)))
 
 
 def gtr_masking(alpha: Any, gamma: Any, cosine: Any) -> Any:
     """G1 of :func:`gtr`."""
-    return masking(gtr, alpha, gamma, cosine)
+    return smith(gtr, alpha, gamma, cosine)
 
 
 def sgd_masking(alpha: Any, p: Any, cosine: Any) -> Any:
     """G1 of :func:`sgd`."""
-    return masking(sgd, alpha, p, cosine)
+    return smith(sgd, alpha, p, cosine)
 
 
 # Models: one channel, directions as triples ---------------------------------------------------------------------------

@@ -24,6 +24,8 @@ TITLES = {
     "fresnel": "Fresnel reflectance",
     "special": "Special functions",
 }
+A_PICTURE = 24
+"""Maps that one picture shows."""
 DIGITS = {"float64": 16, "float32": 8}
 
 
@@ -36,10 +38,13 @@ def write_atlas(out_dir: StrPath, draws: int | None = None, say: Callable[[str],
     groups = []
     for key, title in TITLES.items():
         members = [r for r in records if r.group == key]
-        picture = _picture(members)
-        _write(out / "stability" / f"{key}.png", picture)
-        embedded = f"data:image/png;base64,{base64.b64encode(picture).decode()}"
-        groups.append({"key": key, "title": title, "rows": [_row(r) for r in members], "embedded": embedded})
+        names = [f"{key}-{k}" for k in range(1, 2 + sum(len(_maps([r])) for r in members) // A_PICTURE)]
+        pictures = [_picture(part) for part in _shared_out(members, len(names))]
+        names = names if len(names) > 1 else [key]
+        for name, picture in zip(names, pictures, strict=True):
+            _write(out / "stability" / f"{name}.png", picture)
+        shown = [{"name": n, "embedded": base64.b64encode(p).decode()} for n, p in zip(names, pictures, strict=True)]
+        groups.append({"title": title, "rows": [_row(r) for r in members], "pictures": shown})
     templates = Environment(
         loader=FileSystemLoader(Path(__file__).parent), undefined=StrictUndefined, trim_blocks=True, lstrip_blocks=True
     )
@@ -64,6 +69,23 @@ def write_atlas(out_dir: StrPath, draws: int | None = None, say: Callable[[str],
     }
     _write(out / "stability.json", (json.dumps(document, indent=1, allow_nan=False) + "\n").encode())
     return out / "stability.html"
+
+
+def _maps(records: Sequence[Record]) -> list[tuple[Record, Map]]:
+    return [(r, m) for r in records if r.precision == "float64" for m in r.maps]
+
+
+def _shared_out(records: Sequence[Record], count: int) -> list[list[Record]]:
+    """The records in order, in ``count`` pictures of about as many maps."""
+    total = len(_maps(records))
+    out: list[list[Record]] = [[] for _ in range(count)]
+    names = list(dict.fromkeys(r.name for r in records))
+    seen = 0
+    for name in names:
+        mine = [r for r in records if r.name == name]
+        out[min(seen * count // max(total, 1), count - 1)] += mine
+        seen += len(_maps(mine))
+    return out
 
 
 def _where(found: Worst) -> str:
@@ -112,10 +134,10 @@ def _picture(records: Sequence[Record]) -> bytes:
     from matplotlib.backends.backend_agg import FigureCanvasAgg
     from matplotlib.figure import Figure
 
-    pairs = [(r, m) for r in records for m in r.maps if r.precision == "float64"]
+    pairs = _maps(records)
     single = {(r.name, m.varied): m for r in records for m in r.maps if r.precision == "float32"}
     with rc_context({"font.size": 6, "axes.linewidth": 0.4, "xtick.major.width": 0.3, "ytick.major.width": 0.3}):
-        figure = Figure(figsize=(8.2, 0.35 + 1.15 * len(pairs)), layout="constrained")
+        figure = Figure(figsize=(8.2, 0.35 + 0.95 * len(pairs)), layout="constrained")
         FigureCanvasAgg(figure)
         axes = figure.subplots(max(len(pairs), 1), 4, squeeze=False)  # the V-cavity alone has no map
         for row, (line, (record, m)) in enumerate(zip(axes, pairs, strict=False)):

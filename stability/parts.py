@@ -2,8 +2,8 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable
-from dataclasses import dataclass
+from collections.abc import Callable, Mapping
+from dataclasses import dataclass, replace
 from typing import Any
 
 import jax.numpy as jnp
@@ -14,11 +14,15 @@ from numpy.typing import NDArray
 from .. import models, special
 from ..geometry import Geometry, from_sums
 from ..models import fresnel, masking, ndf, parameters_of
+from ..models.blocks import FRESNELS, MASKINGS, NDFS
+from ..models.ndf.stretched import Stretched
 from . import domain
 from .domain import GRAZING, Range
 
 Reals = NDArray[np.float64]
 Program = Callable[[Array], Array]
+Mask = Callable[[Reals], NDArray[np.bool_]]
+"""Of points ``[n, arguments]``."""
 
 _REFLECTANCE = (1e-40, 1e-20)
 DIRECTIONS = tuple(f"{end}_{axis}" for end in ("wi", "wo") for axis in "xyz")
@@ -46,9 +50,9 @@ class Part:
     """The same drawn over the whole domain."""
     extra: tuple[str, ...] = ()
     integral: bool = False
-    """Whether its reference is an integral, and slow."""
-    kinked: bool = False
-    """Whether it has no derivative in the directions where n.l = n.v."""
+    """Whether its reference is an integral or a series, and slow."""
+    kink: Mask | None = None
+    """Where it has no derivative by directions or angles; None for a smooth part."""
     varied: tuple[str, ...] = ()
     """The arguments that have a map."""
     lift: Callable[[Array], Array] = lambda x: x
@@ -139,7 +143,62 @@ def _few_directions(rng: np.random.Generator, n: int) -> Reals:
     return np.concatenate([domain.unit(theta, 0.3), domain.unit(theta, 0.3 + across)], -1)
 
 
-def _model(cls: type[models.BRDF], integral: bool) -> Part:
+def level(points: Reals) -> NDArray[np.bool_]:
+    """Where n.l = n.v, and what depends on the larger of them has a kink."""
+    found: NDArray[np.bool_] = np.abs(points[:, -4] - points[:, -1]) < 1e-6
+    return found
+
+
+def upright(points: Reals) -> NDArray[np.bool_]:
+    """Where a direction is the normal, and its polar angle has no derivative."""
+    found: NDArray[np.bool_] = np.maximum(points[:, -4], points[:, -1]) > 1 - 1e-9
+    return found
+
+
+def crease(points: Reals) -> NDArray[np.bool_]:
+    """Where n.l = n.v, or the azimuths lie at right angles: what is not negative of their cosine has a kink."""
+    across = points[:, -6] * points[:, -3] + points[:, -5] * points[:, -2]
+    found: NDArray[np.bool_] = level(points) | (np.abs(across) < 1e-6)
+    return found
+
+
+def cusp(points: Reals) -> NDArray[np.bool_]:
+    """Where the half vector is the normal."""
+    found: NDArray[np.bool_] = np.hypot(points[:, -6] + points[:, -3], points[:, -5] + points[:, -2]) < 1e-12
+    return found
+
+
+def pole(points: Reals) -> NDArray[np.bool_]:
+    """Where an angle is 0."""
+    found: NDArray[np.bool_] = points[:, -1] == 0
+    return found
+
+
+def normal_incidence(points: Reals) -> NDArray[np.bool_]:
+    """Where a cosine is 1."""
+    found: NDArray[np.bool_] = points[:, -1] == 1
+    return found
+
+
+KINKS: dict[str, Mask] = {
+    **dict.fromkeys(("abc", "ashikhmin_shirley", "low_microfacet", "max_phong"), level),
+    **dict.fromkeys(("cook_torrance", "cook_torrance_blinn", "cook_torrance_gaussian"), level),
+    **dict.fromkeys(("oren_nayar", "oren_nayar_full"), crease),
+    "strauss": upright,
+    "epd": cusp,
+}
+"""By model: those that are not here are smooth."""
+
+_SMALLEST = {"strauss": (1e-30, 1e-20), "schwenk": (1e-280, 1e-40)}
+"""Models that may be black because of a reflectance of 0, or because the square of a smoothness is."""
+
+INTEGRALS = ("gtr", "sgd", "epd", "abc", "blinn", "gaussian")
+"""Distributions whose Smith masking has no closed form; the first three are those of a named model with that masking."""
+SLOW = (*INTEGRALS[:3], "htsg", "stam_diffraction")
+"""Models whose reference is an integral or a series."""
+
+
+def _model(cls: type[models.BRDF]) -> Part:
     specs = parameters_of(cls)
     count = len(specs)
 
@@ -151,77 +210,117 @@ def _model(cls: type[models.BRDF], integral: bool) -> Part:
         g = _geometry(y[count:])
         return jnp.broadcast_to(cls(**{p.name: y[k] for k, p in enumerate(specs)}).evaluate(g), g.shape)
 
-    name = cls.__name__
-    ranges = domain.PARAMETERS[name]
-    shapes = tuple(n for n in ranges if n not in ("diffuse", "specular", "f0", "f1"))
-    place = _aside(0.3, 1.0 if integral else 0.8)
-    scatter = _few_directions if integral else domain.draw_directions
+    ranges = domain.ranges_of(specs, cls.name)
+    # of what comes several times, as lobes do, the first
+    shapes = tuple(p.name for p in specs if not p.linear and p.name.rpartition("_")[2] not in _FURTHER)
+    slow = cls.name in SLOW
     return Part(
         "models",
-        name,
-        {p.name: ranges[p.name] for p in specs},
+        cls.__name__,
+        ranges,
         formula,
         "polar angle of the light",
         POLAR,
-        place,
-        scatter,
+        _aside(0.3, 1.0 if slow else 0.8),
+        _few_directions if slow else domain.draw_directions,
         DIRECTIONS,
-        integral,
-        kinked=name in ("ABC", "AshikhminShirley", "AshikhminShirleyAnisotropic"),
+        slow,
+        kink=KINKS.get(cls.name),
         varied=shapes or ("diffuse",),
         lift=_sums,
         whole=whole,
-        smallest=_REFLECTANCE if "ior" in ranges else Part.smallest,
+        smallest=_SMALLEST.get(cls.name, _REFLECTANCE if "ior" in ranges else Part.smallest),
     )
 
 
-def _ndf(name: str, shape: str, density: Callable[..., Any]) -> Part:
-    """A density of theta_m, ``density(*parameters, sin^2, cos^2)``."""
-    ranges = domain.SHAPES[shape]
+_FURTHER = {str(k) for k in range(2, 20)}
+
+
+def _declared(fields: Mapping[str, Any], owner: str) -> dict[str, Range]:
+    """Ranges of the parameters that a block brings."""
+    return domain.ranges_of((replace(f.metadata["parameter"], name=n) for n, f in fields.items()), owner)
+
+
+def _of_model(name: str, form: int = 0) -> dict[str, Range]:
+    """Ranges of what bends the lobe of a model."""
+    return domain.ranges_of((p for p in parameters_of(models.MODELS[name][form]) if not p.linear), name)
+
+
+def _ndf(name: str, ranges: dict[str, Range], density: Callable[..., Any]) -> Part:
+    """A density of theta_m, ``density(sin^2, cos^2, *parameters)``."""
 
     def formula(y: Array) -> Array:
-        out: Array = density(*y[:-2], y[-2] ** 2, y[-1] ** 2)
+        out: Array = density(y[-2] ** 2, y[-1] ** 2, *y[:-2])
         return out
 
     varied, extra = tuple(ranges), ("theta",)
-    return Part("ndf", name, ranges, formula, "theta_m", LOBE, _angle, _any_angle, extra, varied=varied, lift=_sine_cosine)
-
-
-def _anisotropic(name: str, shape: str, density: Callable[..., Any]) -> Part:
-    """A density of the half vector, ``density(*parameters, geometry)``."""
-    ranges = domain.SHAPES[shape]
-
-    def formula(y: Array) -> Array:
-        out: Array = density(*y[:-8], _geometry(y[-8:]))
-        return out
-
-    place, scatter = _aside(0.3, 0.8), domain.draw_directions
-    angle, varied = "polar angle of the light", tuple(ranges)
-    return Part("ndf", name, ranges, formula, angle, POLAR, place, scatter, DIRECTIONS, varied=varied, lift=_sums)
-
-
-def _smith(shape: str, lobe: type) -> Part:
-    def formula(y: Array) -> Array:
-        """Projected area of the facets that face the viewer, n.v/G1: what models divide by, and regular at grazing."""
-        return y[2] + masking.averted_area(lobe(y[0], y[1]), y[2])
-
-    ranges = domain.SHAPES[shape]
-    angle, name = "polar angle", f"Smith, {shape}"
+    kink = pole if name == "epd" else None
     return Part(
-        "masking", name, ranges, formula, angle, POLAR, _cosine, _any_cosine, ("cosine",), True, varied=tuple(ranges)
+        "ndf", name, ranges, formula, "theta_m", LOBE, _angle, _any_angle, extra, kink=kink, varied=varied, lift=_sine_cosine
     )
 
 
-def _fresnel(name: str) -> Part:
-    ranges = domain.FRESNEL[name]
-    function = getattr(fresnel, name)
+def _directed(group: str, name: str, ranges: dict[str, Range], value: Callable[..., Any], kink: Mask | None = None) -> Part:
+    """A function of two directions, ``value(geometry, *parameters)``."""
+
+    def formula(y: Array) -> Array:
+        out: Array = value(_geometry(y[-8:]), *y[:-8])
+        return out
+
+    place, scatter, varied = _aside(0.3, 0.8), domain.draw_directions, tuple(ranges)
+    angle = "polar angle of the light"
+    return Part(group, name, ranges, formula, angle, POLAR, place, scatter, DIRECTIONS, kink=kink, varied=varied, lift=_sums)
+
+
+def _smith(name: str) -> Part:
+    make = NDFS[name].make
+    ranges = _declared(NDFS[name].parameters, name)
+
+    def formula(y: Array) -> Array:
+        """Projected area of the facets that face the viewer, n.v/G1: what models divide by, and regular at grazing."""
+        return y[-1] + masking.averted_area(make(*y[:-1]), y[-1])
+
+    angle, slow = "polar angle", name in INTEGRALS
+    # a power of the sine that is no square, below gamma = 2 or for a small exponent
+    kink = normal_incidence if name in ("student_t", "blinn") else None
+    return Part(
+        "masking",
+        f"Smith, {name}",
+        ranges,
+        formula,
+        angle,
+        POLAR,
+        _cosine,
+        _any_cosine,
+        ("cosine",),
+        slow,
+        kink,
+        tuple(ranges),
+    )
+
+
+def _masking(name: str) -> Part:
+    """V of a block, where it depends on the distribution that of GGX."""
+    block = MASKINGS[name]
+    of_ggx = block.needs_alpha or name.startswith("smith")
+    ranges = _declared(NDFS["ggx"].parameters, "ggx") if of_ggx else {}
+    kink = level if name in ("vcavity", "half_vector") else None
+
+    def value(g: Geometry, *shape: Array) -> Array:
+        return jnp.broadcast_to(block.visibility(ndf.GGX(*shape) if shape else None, g), g.shape)
+
+    return _directed("masking", f"{name}, ggx" if of_ggx else name, ranges, value, kink)
+
+
+def _fresnel(name: str, ranges: dict[str, Range], value: Callable[..., Any]) -> Part:
+    """A reflectance, ``value(geometry, *parameters)``."""
 
     def formula(y: Array) -> Array:
         one = jnp.ones_like(y[-1])
-        out: Array = function(*y[:-2], Geometry(one, one, one, 0 * one, y[-1], y[-2] ** 2))
+        out: Array = value(Geometry(one, one, one, 0 * one, y[-1], y[-2] ** 2), *y[:-2])
         return out
 
-    varied, extra = tuple(ranges)[:1], ("theta",)
+    varied, extra = tuple(n for n in ranges if n != "specular") or tuple(ranges), ("theta",)
     return Part(
         "fresnel",
         name,
@@ -234,7 +333,7 @@ def _fresnel(name: str) -> Part:
         extra,
         varied=varied,
         lift=_sine_cosine,
-        smallest=_REFLECTANCE if name == "dielectric" else Part.smallest,
+        smallest=_REFLECTANCE if "ior" in ranges else Part.smallest,
     )
 
 
@@ -246,7 +345,7 @@ def _special(name: str, ranges: dict[str, Range], formula: Program, second: str,
         return c[:, None] if second else np.empty((len(c), 0))
 
     def scatter(rng: np.random.Generator, n: int) -> Reals:
-        return domain.draw({second: domain.PARAMETERS["SGD"]["p"]}, rng, n) if second else np.empty((n, 0))
+        return domain.draw({second: _SGD["p"]}, rng, n) if second else np.empty((n, 0))
 
     return Part("special", name, ranges, formula, second or "any", columns, place, scatter, extra, varied=tuple(ranges)[:1])
 
@@ -255,49 +354,38 @@ _NO_COLUMNS = np.zeros(1)
 _EXPM1 = Range(-50, 50, 0, log=False, special=(0.0, 1.0, -1.0))
 _LOG1P = Range(-0.99, 50, 0, log=False, special=(0.0, 0.1, -0.1))
 
+_SGD = _of_model("sgd")
+_WIDTHS = _of_model("ward", 1)
+
 PARTS: tuple[Part, ...] = (
+    *(_model(c) for variants in models.MODELS.values() for c in variants),
     *(
-        _model(c, c.__name__ in ("GTR", "SGD"))
-        for variants in models.MODELS.values()
-        for c in variants
-        if c.__name__ in domain.PARAMETERS
+        _ndf(name, _declared(d.parameters, name), lambda s2, c2, *shape, make=d.make: make(*shape)(s2, c2))
+        for name, d in NDFS.items()
     ),
-    _ndf("GTR", "GTR", lambda a, g, s2, c2: ndf.GTR(a, g)(s2, c2)),
-    _ndf("SGD", "SGD", lambda a, p, s2, c2: ndf.SGD(a, p)(s2, c2)),
-    _ndf("ABC", "ABC", lambda b, c, s2, c2: ndf.ABC(b, c)(s2, c2)),
-    _ndf("power_cosine", "AshikhminShirley", lambda e, s2, c2: ndf.power_cosine(s2, c2, e)),
-    _ndf("gaussian", "Ward", lambda a, s2, c2: ndf.gaussian(s2 / c2, a)),
-    _anisotropic(
+    _ndf("power_cosine", _of_model("ashikhmin_shirley"), ndf.power_cosine),
+    _ndf("gaussian of slopes", _of_model("ward"), lambda s2, c2, a: ndf.gaussian(s2 / c2, a)),
+    _directed(
+        "ndf",
         "power_cosine_anisotropic",
-        "AshikhminShirleyAnisotropic",
-        lambda ex, ey, g: ndf.power_cosine_anisotropic(g.tangential()[0], g.tangential()[1], g.cos2_h, ex, ey),
+        _of_model("ashikhmin_shirley", 1),
+        lambda g, ex, ey: ndf.power_cosine_anisotropic(*g.tangential(), g.cos2_h, ex, ey),
     ),
-    _anisotropic(
-        "anisotropic_gaussian",
-        "WardAnisotropic",
-        lambda ax, ay, g: ndf.anisotropic_gaussian(g.slopes()[0], g.slopes()[1], ax, ay),
+    _directed("ndf", "anisotropic_gaussian", _WIDTHS, lambda g, ax, ay: ndf.anisotropic_gaussian(*g.slopes(), ax, ay)),
+    _directed("ndf", "stretched ggx", _WIDTHS, lambda g, ax, ay: Stretched(ndf.GGX(jnp.sqrt(ax * ay)), ax, ay).density(g)),
+    *(_smith(name) for name in NDFS),
+    *(_masking(name) for name in MASKINGS),
+    *(_fresnel(name, _declared(f.parameters, name), f.value) for name, f in FRESNELS.items()),
+    _fresnel(
+        "sgd_fresnel",
+        domain.ranges_of((p for p in parameters_of(models.MODELS["sgd"][0]) if p.name in ("f0", "f1")), "sgd"),
+        lambda g, f0, f1: fresnel.sgd_fresnel(f0, f1, g),
     ),
-    _smith("GTR", ndf.GTR),
-    _smith("SGD", ndf.SGD),
-    Part(
-        "masking",
-        "vcavity",
-        {},
-        lambda y: masking.vcavity(_geometry(y)),
-        "polar angle of the light",
-        POLAR,
-        _aside(0.3, 0.8),
-        domain.draw_directions,
-        DIRECTIONS,
-        kinked=True,
-        lift=_sums,
-    ),
-    *(_fresnel(name) for name in domain.FRESNEL),
     _special("expm1_ratio", {"x": _EXPM1}, lambda x: special.expm1_ratio(x[0]), "", _NO_COLUMNS),
     _special("log1p_ratio", {"x": _LOG1P}, lambda x: special.log1p_ratio(x[0]), "", _NO_COLUMNS),
     _special(
         "upper incomplete gamma",
-        {"alpha": domain.SHAPES["SGD"]["alpha"]},
+        {"alpha": _SGD["alpha"]},
         lambda x: ndf.SGD(x[0], x[1]).integral(),
         "p",
         np.array([-10, -3.5, -1, 0, 0.5, 1, 1 + 1e-9, 2, 7, 20, 40, 60.0]),
@@ -305,4 +393,4 @@ PARTS: tuple[Part, ...] = (
 )
 """All parts, group by group."""
 
-__all__ = ["DIRECTIONS", "LOBE", "PARTS", "POLAR", "Part"]
+__all__ = ["DIRECTIONS", "LOBE", "PARTS", "POLAR", "Part", "crease", "level", "upright"]

@@ -33,6 +33,16 @@ def _not_stored():
         sys.modules["brdfit.stored_programs"].store_in(None)
 
 
+@pytest.fixture(scope="module")
+def quickly():
+    """For programs that run once: with few optimisations they compile in a third of the time."""
+    import jax
+
+    jax.config.update("jax_disable_most_optimizations", True)
+    yield
+    jax.config.update("jax_disable_most_optimizations", False)
+
+
 @pytest.fixture(scope="session")
 def small_table():
     """``ward-03`` on 24 x 12 x 12 cells, and its truth."""

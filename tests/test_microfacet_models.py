@@ -13,6 +13,7 @@ import jax.numpy as jnp
 import numpy as np
 import pytest
 from brdfit import models
+from brdfit.data.synthetic.layouts import grid
 from brdfit.fitting.result import from_record
 from brdfit.geometry import from_directions
 from brdfit.models import blocks, fresnel, masking, ndf, parameters_of
@@ -20,7 +21,7 @@ from brdfit.stability import microfacets as oracle
 from brdfit.stability.oracle import DIGITS, dielectric, mp, mpf, schlick
 
 from .cases import WI, WO
-from .test_empirical import small_grid
+from .report_cases import table_of
 from .test_energy import albedo
 
 GEOMETRY_CASES = range(0, len(WI), 3)
@@ -212,12 +213,7 @@ def test_composed_model_fits_and_saves():
     """A table of a model of blocks, fitted by its name: parameters come back, and the record has them."""
     name = "microfacet(ggx,schlick_smith,schlick,transmitted)"
     truth = {"diffuse": [0.3, 0.2], "specular": [0.3, 0.1], "alpha": 0.25}
-    grid = small_grid((16, 12, 10))
-    wi, wo = grid.directions()
-    with jax.enable_x64(True):
-        planes = np.moveaxis(np.asarray(brdfit.model(name, **truth)(wi, wo)), -1, 0)
-    planes = np.where((wi[..., 2] <= 0) | (wo[..., 2] <= 0), -1.0, planes)
-    fit = brdfit.fit(brdfit.tables.table(planes, grid, "truth"), name)
+    fit = brdfit.fit(table_of(brdfit.model(name, **truth), grid((16, 12, 10))), name)
     assert fit.converged, fit.reason
     for parameter, value in truth.items():
         np.testing.assert_allclose(fit.parameters[parameter], value, rtol=1e-6)

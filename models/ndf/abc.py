@@ -25,7 +25,7 @@ class ABC(eqx.Module):
         """k, in 1/sr."""
         x, weight = (jnp.asarray(a, jnp.result_type(self.b)) for a in gauss_legendre(64))
         full = jnp.log1p(self.b)
-        # Guard: 40/0 at c = 1, and no end below it (tests/test_models.py::test_derivative).
+        # Guard: 40/0 at c = 1, and no end below it (tests/test_models.py::test_value_and_derivative).
         decay = jnp.maximum(self.c - 1, 1e-3)
         length = jnp.minimum(full, 40 / decay)
         w = x * length
