@@ -37,7 +37,7 @@ KNOWN = {__package__, *FOUNDATIONS, "jaxtyping", "builtins", "collections", "fun
 """Where classes and functions come from that have a name and do not change with it."""
 PREFIX = "version-"
 LOADED = "/brdfit/programs/load"
-"""Event that says how long reading a program took."""
+"""Event that says how long reading a program took, or waiting for the thread that has it."""
 UNUSED_DAYS = 30
 """Programs of other versions of this package are deleted after so long without use."""
 

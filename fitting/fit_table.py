@@ -197,7 +197,7 @@ def _fit(
     with jax.enable_x64(True), compilation() as compiled:
         ready = prepare(table, max_angle, measure, loss, effort)
         used, bound_loss = ready.used, ready.loss
-        prepared, early = time.perf_counter(), compiled.seconds
+        prepared, early = time.perf_counter(), compiled.away
         frame: dict[str, Any] = {
             "material": table.material,
             "source": table.source,
@@ -230,7 +230,7 @@ def _fit(
         found, judged = settle(found, Problem(ready.samples, bound_loss, found[0].problem.chart), named, effort)
         errors = judged.errors
     converged, reason = _verdict(found, effort.rtol)
-    solve = time.perf_counter() - prepared - (compiled.seconds - early)
+    solve = time.perf_counter() - prepared - (compiled.away - early)
     return Fit(
         **frame,
         **vars(judged.estimate),

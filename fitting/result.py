@@ -58,7 +58,7 @@ class Fit:
     cells: dict[str, int]
     """used (fitted), masked (not measured), total; the rest is measured but beyond ``max_angle``."""
     seconds: dict[str, float]
-    """load, prepare, compile, solve."""
+    """load, prepare, compile, solve; waiting for threads that were busy with other fits is in none of them."""
 
     fixed: tuple[str, ...] = ()
     at_bound: tuple[str, ...] = ()

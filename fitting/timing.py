@@ -1,4 +1,4 @@
-"""How long compiling and reading of programs took, as JAX itself reports it, kept apart from solving."""
+"""How long compiling and reading of programs took, as JAX itself reports it, and waiting for other fits: neither is solving."""
 
 from __future__ import annotations
 
@@ -12,21 +12,36 @@ from functools import cache
 
 from ..stored_programs import LOADED
 
+Span = tuple[float, float]
+
 
 @dataclass
 class Compilation:
-    """When threads were tracing, lowering and compiling."""
+    """What a fit did beside its own work."""
 
-    spans: list[tuple[float, float]] = field(default_factory=list)
+    spans: list[Span] = field(default_factory=list)
+    """When threads were tracing, lowering and compiling."""
+    waits: list[Span] = field(default_factory=list)
+    """When it waited for threads that were busy with other fits."""
 
     @property
     def seconds(self) -> float:
-        """Time in which any of them was."""
-        total, until = 0.0, -math.inf
-        for begin, end in sorted(self.spans):
-            total += max(0.0, end - max(begin, until))
-            until = max(until, end)
-        return total
+        """Time in which any thread compiled."""
+        return _length(self.spans)
+
+    @property
+    def away(self) -> float:
+        """Time in which any thread compiled, or it waited."""
+        return _length([*self.spans, *self.waits])
+
+
+def _length(spans: list[Span]) -> float:
+    """Time in any of them."""
+    total, until = 0.0, -math.inf
+    for begin, end in sorted(spans):
+        total += max(0.0, end - max(begin, until))
+        until = max(until, end)
+    return total
 
 
 _current: ContextVar[Compilation | None] = ContextVar("compilation", default=None)
@@ -43,6 +58,13 @@ def _listen() -> None:
             current.spans.append((now - duration_secs, now))
 
     jax.monitoring.register_event_duration_secs_listener(record)
+
+
+def waited(begin: float, end: float) -> None:
+    """From when to when, by the performance counter, the current fit waited for others."""
+    current = _current.get()
+    if current is not None and end > begin:
+        current.waits.append((begin, end))
 
 
 @contextmanager

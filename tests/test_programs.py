@@ -66,6 +66,16 @@ def test_compilation_of_threads_counts_once():
     assert here.seconds > 0, "threads take over the context of the one that asks"
 
 
+def test_waiting_for_other_fits_is_not_solving():
+    """A piece that finds all threads busy with those of another fit says how long it waited; no piece waits for its own."""
+    busy = in_threads(lambda n: time.sleep(0.2), range(os.cpu_count() or 1))
+    with compilation() as here:
+        list(in_threads(lambda n: time.sleep(0.1), range(2 * (os.cpu_count() or 1))))
+    assert 0.1 < here.away < 0.3
+    assert here.seconds == 0
+    list(busy)
+
+
 SCRIPT = """
 import sys
 import jax, jax.numpy as jnp
