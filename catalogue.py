@@ -3,15 +3,19 @@
 from __future__ import annotations
 
 import math
+from collections.abc import Sequence
 from typing import Any
 
 from .fitting.losses import LOSSES
-from .models import EFFECTS, MODELS, parameters_of
+from .models import BRDF, EFFECTS, MODELS, parameters_of, variants
 from .references import REFERENCES
 
 
-def catalogue() -> dict[str, Any]:
-    """Models, effects and losses as JSON values; an end of a range that is infinite is null."""
+def catalogue(names: Sequence[str] = ()) -> dict[str, Any]:
+    """Models, all or those named, effects and losses as JSON values; an end of a range that is infinite is null.
+
+    Raises ValueError for an unknown name.
+    """
     return {
         "models": [
             {
@@ -32,8 +36,7 @@ def catalogue() -> dict[str, Any]:
                     for p in parameters_of(cls)
                 ],
             }
-            for name, forms in MODELS.items()
-            for cls in forms
+            for name, cls in _models(names)
         ],
         "effects": [
             {
@@ -49,17 +52,18 @@ def catalogue() -> dict[str, Any]:
     }
 
 
-def text() -> str:
-    """The catalogue for a terminal."""
+def text(names: Sequence[str] = ()) -> str:
+    """The catalogue for a terminal: all of it, or the models named. Raises ValueError for an unknown name."""
     lines = []
-    for name, forms in MODELS.items():
-        for cls in forms:
-            lines += [f"{name}{' (anisotropic)' if cls.anisotropic else ''}", *_wrapped(cls.__doc__ or "")]
-            for p in parameters_of(cls):
-                shape = "per channel" if p.per_channel else "shared"
-                searched = f"searched [{p.search[0]:g}, {p.search[1]:g}]"
-                lines.append(f"    {p.name:12s} {p.meaning}; unit {p.unit}, {shape}, range {p.valid}, {searched}")
-            lines += [f"    {REFERENCES[key]}" for key in cls.references] + [""]
+    for name, cls in _models(names):
+        lines += [f"{name}{' (anisotropic)' if cls.anisotropic else ''}", *_wrapped(cls.__doc__ or "")]
+        for p in parameters_of(cls):
+            shape = "per channel" if p.per_channel else "shared"
+            searched = f"searched [{p.search[0]:g}, {p.search[1]:g}]"
+            lines.append(f"    {p.name:12s} {p.meaning}; unit {p.unit}, {shape}, range {p.valid}, {searched}")
+        lines += [f"    {REFERENCES[key]}" for key in cls.references] + [""]
+    if names:
+        return "\n".join(lines[:-1])
     lines += ["effects, to be joined by +"]
     for effect in EFFECTS.values():
         needs = f"; needs {', '.join(effect.needs)}" if effect.needs else ""
@@ -68,10 +72,17 @@ def text() -> str:
     return "\n".join(lines)
 
 
+def _models(names: Sequence[str]) -> list[tuple[str, type[BRDF]]]:
+    """Names with a class each: anisotropic forms have the name of the isotropic one."""
+    return [(name, cls) for name in names or MODELS for cls in variants(name)]
+
+
 def _wrapped(doc: str) -> list[str]:
+    import re
     import textwrap
 
-    return textwrap.wrap(" ".join(doc.split()), 110, initial_indent="    ", subsequent_indent="    ")
+    plain = re.sub(r":\w+:`[~.]*([^`]*)`|`+([^`]*)`+", r"\1\2", " ".join(doc.split()))
+    return textwrap.wrap(plain, 110, initial_indent="    ", subsequent_indent="    ")
 
 
 def _end(x: float) -> float | None:

@@ -100,7 +100,7 @@ def commands() -> None:
     """
 
 
-@commands.command("fit")
+@commands.command("fit", short_help="Fit models to tables; writes fits.json and a report.")
 @click.argument("files", nargs=-1, required=True, metavar="FILE...")
 @click.option("--model", "models", default=DEFAULT_MODELS, show_default=True, help="Models, separated by commas.")
 @click.option("--out", "out_dir", required=True, metavar="DIR", help="Where fits.json and report.html go.")
@@ -216,7 +216,7 @@ def fit_command(
     return OK if all(f.converged for f in fits) else SOME_FAILED
 
 
-@commands.command("synth")
+@commands.command("synth", short_help="Write synthetic tables whose parameters are known.")
 @click.argument("names", nargs=-1, metavar="[NAME]...")
 @click.option("--out", "out_dir", metavar="DIR", help="Where the tables go.")
 @click.option("--seed", default=0, show_default=True, type=click.IntRange(0), help="Seed of the noise.")
@@ -254,7 +254,7 @@ def synth_command(
     return OK
 
 
-@commands.command("report")
+@commands.command("report", short_help="Rebuild a report from its fits.json.")
 @click.argument("directory", metavar="DIR")
 def report_command(directory: str) -> int:
     """Rebuild DIR/report.html from DIR/fits.json."""
@@ -264,17 +264,21 @@ def report_command(directory: str) -> int:
     return OK
 
 
-@commands.command("models")
+@commands.command("models", short_help="List models with their parameters, and losses.")
+@click.argument("names", nargs=-1, metavar="[NAME]...")
 @click.option("--json", "as_json", is_flag=True, help="Print as JSON.")
-def models_command(as_json: bool) -> int:
-    """List every model with its parameters, ranges, units and source, and every loss."""
+def models_command(names: tuple[str, ...], as_json: bool) -> int:
+    """List every model, or those named, with parameters, ranges, units and source; and every loss."""
     from .catalogue import catalogue, text
 
-    click.echo(json.dumps(catalogue(), indent=1) if as_json else text())
+    try:
+        click.echo(json.dumps(catalogue(names), indent=1) if as_json else text(names))
+    except ValueError as fault:
+        raise click.UsageError(str(fault), click.get_current_context()) from None
     return OK
 
 
-@commands.command("stability")
+@commands.command("stability", short_help="Measure how many digits every model keeps.")
 @click.option("--out", "out_dir", required=True, metavar="DIR", help="Where stability.md, .html and .json go.")
 @click.option("--draws", type=click.IntRange(1), help="Random draws of each part that must be finite.  [default: some]")
 @click.option("--quiet", is_flag=True, help="Print nothing.")
@@ -294,7 +298,7 @@ def stability_command(out_dir: str, draws: int | None, quiet: bool) -> int:
     return OK
 
 
-@commands.command("tradeoff")
+@commands.command("tradeoff", short_help="Measure what accuracy costs in time.")
 @click.argument("file", metavar="FILE")
 @click.option("--out", "out_dir", required=True, metavar="DIR", help="Where tradeoff.html and tradeoff.json go.")
 @click.option("--model", help="Whose fitting settings are measured.  [default: the best by perceptual error]")
@@ -323,7 +327,7 @@ def tradeoff_command(
     return OK if all(f.converged for f in result.fits) else SOME_FAILED
 
 
-@commands.command("scene")
+@commands.command("scene", short_help="Find the effects that a scene calls for.")
 @click.argument("scene_file", metavar="SCENE.toml")
 @click.argument("file", metavar="FILE")
 @click.option("--out", "out_dir", required=True, metavar="DIR", help="Where scene.html and scene.json go.")

@@ -156,6 +156,15 @@ def test_synth_lists_names(capsys):
     assert {"gtr-00", "abc-nickel", "misfit-coated"} <= set(capsys.readouterr().out.split())
 
 
+def test_models_lists_those_named(capsys):
+    assert run("models", "body+lobe", "ward") == 0
+    out = capsys.readouterr().out
+    assert [line for line in out.splitlines() if line and line[0] != " "] == ["body+lobe", "ward", "ward (anisotropic)"]
+    assert ":class:" not in out
+    assert run("models", "wart") == 2
+    assert "unknown model 'wart'" in capsys.readouterr().err
+
+
 def test_models_lists_everything(capsys):
     assert run("models") == 0
     text = capsys.readouterr().out
