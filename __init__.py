@@ -18,9 +18,11 @@ if TYPE_CHECKING:
     from .models import model as model
     from .models import parameter as parameter
     from .models.factory import microfacet as microfacet
+    from .reports import report as report
     from .scenes.ready import ready as ready
     from .tables import Table as Table
     from .tables import load as load
+    from .tables import measurements as measurements
     from .tables import save as save
 
 __version__ = "0.1.0"
@@ -40,11 +42,13 @@ _PUBLIC = {
     "fit": "fitting",
     "fit_many": "fitting",
     "load": "tables",
+    "measurements": "tables",
     "microfacet": "models.factory",
     "model": "models",
     "parameter": "models",
     "preset": "data",
     "ready": "scenes.ready",
+    "report": "reports",
     "save": "tables",
 }
 

@@ -12,6 +12,13 @@ from numpy.typing import ArrayLike, NDArray
 Reals = NDArray[np.float64]
 
 
+def unit_vectors(theta: ArrayLike, phi: ArrayLike) -> Reals:
+    """Unit vectors ``[..., 3]`` of polar angles and azimuths in radians that broadcast; z is the normal."""
+    t, p = np.broadcast_arrays(np.asarray(theta, float), np.asarray(phi, float))
+    # cos(theta) as the sine of the complement keeps its digits at grazing
+    return np.stack([np.sin(t) * np.cos(p), np.sin(t) * np.sin(p), np.sin(np.pi / 2 - t)], -1)
+
+
 def directions(theta_h: ArrayLike, theta_d: ArrayLike, phi_d: ArrayLike, phi_h: ArrayLike = 0.0) -> tuple[Reals, Reals]:
     """Unit vectors ``(wi, wo)``, each ``[..., 3]``, of half/difference angles in radians that broadcast."""
     th, td, pd, ph = np.broadcast_arrays(*(np.asarray(a, float) for a in (theta_h, theta_d, phi_d, phi_h)))
@@ -52,4 +59,4 @@ def half_difference(wi: ArrayLike, wo: ArrayLike) -> tuple[Reals, Reals, Reals, 
     return theta_h, theta_d, np.arctan2(dy, x), phi_h
 
 
-__all__ = ["directions", "half_difference", "polar_cosines"]
+__all__ = ["directions", "half_difference", "polar_cosines", "unit_vectors"]

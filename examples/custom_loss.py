@@ -6,12 +6,9 @@ Fits Ward's model to a synthetic material by a named loss and by this one, and w
 """
 
 import sys
-from pathlib import Path
 
 import brdfit
 from brdfit.data import synthetic
-from brdfit.environment import environment
-from brdfit.reports import gather, write_fits, write_report
 
 
 def reflected_light(predicted, measured, geometry):
@@ -21,14 +18,11 @@ def reflected_light(predicted, measured, geometry):
 
 def main(out="out/custom-loss"):
     """Fit and report."""
-    Path(out).mkdir(parents=True, exist_ok=True)
     table, _ = synthetic.generate("misfit-two-lobes", grid=(30, 15, 12))
     fits = [brdfit.fit(table, "ward", loss=loss) for loss in ("log", reflected_light)]
     for fit in fits:
         print(f"{fit.loss:16s} alpha {fit.parameters['alpha']:.4f}, {fit.reason}")
-    where = environment()
-    write_fits(out, fits, where)
-    print(f"report: {write_report(out, fits, [gather(table, fits)], where)}")
+    print(f"report: {brdfit.report(out, fits, table)}")
 
 
 if __name__ == "__main__":

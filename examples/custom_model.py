@@ -6,15 +6,12 @@ Fits Minnaert's model beside a built-in one to a table made from Minnaert's, and
 """
 
 import sys
-from pathlib import Path
 from typing import ClassVar
 
 import brdfit
 import jax.numpy as jnp
 import numpy as np
 from brdfit.data import synthetic
-from brdfit.environment import environment
-from brdfit.reports import gather, write_fits, write_report
 from brdfit.tables import table
 from jaxtyping import Array, Float
 
@@ -34,7 +31,6 @@ class Minnaert(brdfit.BRDF):
 
 def main(out="out/custom-model"):
     """Fit and report."""
-    Path(out).mkdir(parents=True, exist_ok=True)
     truth = Minnaert(albedo=np.array([0.4, 0.3, 0.2]), k=np.array(1.3))
     layout = synthetic.grid((30, 15, 12))
     _, planes = synthetic.evaluate(truth, layout)
@@ -42,9 +38,7 @@ def main(out="out/custom-model"):
     fits = [brdfit.fit(moon, model) for model in (Minnaert, "lambert")]
     for fit in fits:
         print(f"{fit.model_name:10s} error {fit.errors['log']:.5f}, {fit.reason}")
-    where = environment()
-    write_fits(out, fits, where)
-    print(f"report: {write_report(out, fits, [gather(moon, fits)], where)}")
+    print(f"report: {brdfit.report(out, fits, moon)}")
 
 
 if __name__ == "__main__":

@@ -1,4 +1,4 @@
-"""How long compiling and reading of programs took, as JAX itself reports it, and waiting for other fits: neither is solving."""
+"""How long a fit compiled or read programs, as JAX itself reports it, or waited for other fits: neither is solving."""
 
 from __future__ import annotations
 

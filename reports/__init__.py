@@ -2,7 +2,7 @@
 
 from .evidence import save_evidence
 from .gather import Views, gather
-from .write import read_fits, rebuild_report, write_fits, write_report
+from .write import read_fits, rebuild_report, report, write_fits, write_report
 
 
 def preload() -> None:
@@ -14,4 +14,14 @@ def preload() -> None:
     library()
 
 
-__all__ = ["Views", "gather", "preload", "read_fits", "rebuild_report", "save_evidence", "write_fits", "write_report"]
+__all__ = [
+    "Views",
+    "gather",
+    "preload",
+    "read_fits",
+    "rebuild_report",
+    "report",
+    "save_evidence",
+    "write_fits",
+    "write_report",
+]

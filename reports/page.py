@@ -149,16 +149,10 @@ def _about(fits: Sequence[Fit]) -> str:
     cells = f.cells
     used, masked, total = (cells.get(k, 0) for k in ("used", "masked", "total"))
     beyond = total - used - masked
-    settings = sorted(
-        {f"loss {f.loss}, measure {f.measure.replace('_', ' ')}, angles at the cell's {f.angles}" for f in fits}
-    )
-    text = (
-        PurePath(f.source).name
-        + (f" (SHA-256 {f.sha256[:12]}…)" if f.sha256 else "")
-        + ". "
-        + "; ".join(settings).capitalize()
-        + ". "
-    )
+    where = "" if f.angles == "exact" else f", angles at the cell's {f.angles}"
+    settings = sorted({f"loss {f.loss}, measure {f.measure.replace('_', ' ')}{where}" for f in fits})
+    file = PurePath(f.source).name + (f" (SHA-256 {f.sha256[:12]}…)" if f.sha256 else "")
+    text = (f"{file}. " if file else "") + "; ".join(settings).capitalize() + ". "
     text += (
         f"{words.thousands(used)} of {words.thousands(total)} cells fitted, {words.thousands(masked)} masked as not measured"
     )

@@ -15,6 +15,7 @@ from .page import page
 
 if TYPE_CHECKING:
     from ..fitting.result import Fit
+    from ..tables import Table
 
 FITS = "fits.json"
 REPORT = "report.html"
@@ -91,6 +92,30 @@ def write_report(out_dir: StrPath, fits: Sequence[Fit], evidence: Sequence[Evide
     return _write(Path(out_dir) / REPORT, html)
 
 
+def report(out_dir: StrPath, fits: Fit | Sequence[Fit], tables: Table | Sequence[Table]) -> Path:
+    """Write fits of some tables as DIR/fits.json and DIR/report.html, as the command line does; DIR is made if need be.
+
+    Returns the path of the report. Raises ValueError if a fit is of none of the tables.
+    """
+    from ..environment import environment
+    from ..fitting.result import Fit
+    from .evidence import save_evidence
+    from .gather import gather
+
+    fits = [fits] if isinstance(fits, Fit) else list(fits)
+    tables = tables if isinstance(tables, Sequence) else [tables]
+    known = {(t.material, t.source): t for t in tables}
+    for f in fits:
+        if (f.material, f.source) not in known:
+            raise ValueError(f"no table given for the fit of {f.model_name} to {f.material} ({f.source or 'no source'})")
+    out = Path(out_dir)
+    out.mkdir(parents=True, exist_ok=True)
+    evidence, where = [gather(t, [f for f in fits if (f.material, f.source) == k]) for k, t in known.items()], environment()
+    write_fits(out, fits, where)
+    save_evidence(out, evidence)
+    return write_report(out, fits, evidence, where)
+
+
 def rebuild_report(out_dir: StrPath) -> Path:
     """Write DIR/report.html again from DIR/fits.json and, where it is there, DIR/evidence.h5."""
     fits, environment = read_fits(out_dir)
@@ -103,4 +128,4 @@ def _write(path: Path, text: str) -> Path:
     return path
 
 
-__all__ = ["read_fits", "rebuild_report", "write_fits", "write_report"]
+__all__ = ["read_fits", "rebuild_report", "report", "write_fits", "write_report"]

@@ -272,6 +272,11 @@ def _directed(group: str, name: str, ranges: dict[str, Range], value: Callable[.
     return Part(group, name, ranges, formula, angle, POLAR, place, scatter, DIRECTIONS, kink=kink, varied=varied, lift=_sums)
 
 
+def _anisotropic_gaussian(g: Geometry, alpha_x: Array, alpha_y: Array) -> Array:
+    slope_x2, slope_y2 = g.slopes()
+    return ndf.anisotropic_gaussian(slope_x2, slope_y2, alpha_x, alpha_y)
+
+
 def _smith(name: str) -> Part:
     make = NDFS[name].make
     ranges = _declared(NDFS[name].parameters, name)
@@ -369,9 +374,9 @@ PARTS: tuple[Part, ...] = (
         "ndf",
         "power_cosine_anisotropic",
         _of_model("ashikhmin_shirley", 1),
-        lambda g, ex, ey: ndf.power_cosine_anisotropic(*g.tangential(), g.cos2_h, ex, ey),
+        lambda g, ex, ey: ndf.power_cosine_anisotropic(g.h_x2, g.h_y2, g.cos2_h, ex, ey),
     ),
-    _directed("ndf", "anisotropic_gaussian", _WIDTHS, lambda g, ax, ay: ndf.anisotropic_gaussian(*g.slopes(), ax, ay)),
+    _directed("ndf", "anisotropic_gaussian", _WIDTHS, _anisotropic_gaussian),
     _directed("ndf", "stretched ggx", _WIDTHS, lambda g, ax, ay: Stretched(ndf.GGX(jnp.sqrt(ax * ay)), ax, ay).density(g)),
     *(_smith(name) for name in NDFS),
     *(_masking(name) for name in MASKINGS),

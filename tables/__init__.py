@@ -3,6 +3,7 @@
 from .hdf5 import read_hdf5, read_truth, write_hdf5
 from .layout import HalfDifferenceGrid, Layout, Scattered, SphericalGrid
 from .load import load, save
+from .measurements import measurements
 from .merl import merl_grid, read_merl, write_merl
 from .table import Convention, Table, table
 
@@ -14,6 +15,7 @@ __all__ = [
     "SphericalGrid",
     "Table",
     "load",
+    "measurements",
     "merl_grid",
     "read_hdf5",
     "read_merl",

@@ -12,7 +12,7 @@ from functools import cached_property, lru_cache
 import numpy as np
 from numpy.typing import NDArray
 
-from ..angles import directions, polar_cosines
+from ..angles import directions, polar_cosines, unit_vectors
 
 Reals = NDArray[np.float64]
 
@@ -130,8 +130,8 @@ class SphericalGrid:
     def directions(self) -> tuple[Reals, Reals]:
         """Unit vectors to light and viewer, each ``[*shape, 3]``."""
         phi_i = np.zeros(()) if self.phi_i is None else self.phi_i[:, None, None, None]
-        wi = _unit(self.theta_i[:, None, None], phi_i)
-        wo = _unit(self.theta_o[:, None], self.phi_o)
+        wi = unit_vectors(self.theta_i[:, None, None], phi_i)
+        wo = unit_vectors(self.theta_o[:, None], self.phi_o)
         shape = (*self.shape, 3)
         return np.broadcast_to(wi, shape), np.broadcast_to(wo, shape)
 
@@ -160,9 +160,3 @@ class Scattered:
 
 
 Layout = HalfDifferenceGrid | SphericalGrid | Scattered
-
-
-def _unit(theta: Reals, phi: Reals) -> Reals:
-    theta, phi = np.broadcast_arrays(theta, phi)
-    # cos(theta) as the sine of the complement keeps its digits at grazing
-    return np.stack([np.sin(theta) * np.cos(phi), np.sin(theta) * np.sin(phi), np.sin(np.pi / 2 - theta)], -1)

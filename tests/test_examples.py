@@ -5,6 +5,7 @@ import subprocess
 import sys
 from pathlib import Path
 
+import brdfit
 import pytest
 
 EXAMPLES = Path(__file__).resolve().parents[1] / "examples"
@@ -45,3 +46,12 @@ def test_custom_model(example):
     assert "minnaert" in page
     assert "darkening towards the limb" in page
     assert page.index("minnaert") < page.index("lambert"), "the better model ranks first"
+
+
+def test_own_measurements(example, tmp_path):
+    (ggx, ward), page = example("own_measurements.py")
+    # the scan's noise of 2 % leaves this much undecided, by its own account
+    assert abs(ggx["parameters"]["alpha"] - 0.2) < 4 * max(ggx["stderr"]["alpha"], ggx["spread"]["alpha"])
+    assert ggx["errors"]["log"] < ward["errors"]["log"]
+    assert brdfit.load(tmp_path / "report" / "scan.h5").channels == 3
+    assert "scan" in page

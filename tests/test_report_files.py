@@ -9,7 +9,7 @@ import pytest
 from brdfit.errors import InputError
 from brdfit.reports.evidence import load_evidence, save_evidence
 from brdfit.reports.gather import gather
-from brdfit.reports.write import read_fits, rebuild_report, write_fits, write_report
+from brdfit.reports.write import read_fits, rebuild_report, report, write_fits, write_report
 
 from .report_cases import ENVIRONMENT, Reader
 
@@ -103,3 +103,16 @@ def test_broken_evidence_is_one_line(tmp_path):
     (tmp_path / "evidence.h5").write_bytes(b"not HDF5 at all")
     with pytest.raises(InputError, match="cannot be read as evidence of a fit"):
         load_evidence(tmp_path)
+
+
+def test_report_in_one_call(tmp_path, measured, fits):
+    path = report(tmp_path / "new" / "folder", fits, measured)
+    read, where = read_fits(path.parent)
+    assert [f.model_name for f in read] == [f.model_name for f in fits]
+    assert where["jax"]
+    assert len(load_evidence(path.parent)) == 1
+    alone = report(tmp_path / "alone", fits[0], [measured]).read_text()
+    assert fits[0].model_name in alone
+    with pytest.raises(ValueError, match="no table given for the fit of"):
+        report(tmp_path / "none", fits, [])
+    assert not (tmp_path / "none").exists()

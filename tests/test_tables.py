@@ -3,7 +3,8 @@
 import mpmath as mp
 import numpy as np
 import pytest
-from brdfit.tables import HalfDifferenceGrid, Scattered, SphericalGrid, merl_grid, table
+from brdfit.angles import unit_vectors
+from brdfit.tables import HalfDifferenceGrid, Scattered, SphericalGrid, measurements, merl_grid, table
 
 QUARTER, HALF, FULL = np.pi / 2, np.pi, 2 * np.pi
 
@@ -166,3 +167,38 @@ def test_within_on_other_layouts():
     for wi, wo in ((v, up), (up, v)):
         found = table(np.ones((1, 4)), Scattered(wi, wo, np.ones(4)), "a").within(np.radians(80))
         np.testing.assert_array_equal(found, [True, True, False, False])
+
+
+UP = np.tile([0.0, 0.0, 1.0], (4, 1))
+
+
+def test_measurements_become_a_table():
+    tilted = unit_vectors(np.radians([0, 30, 60, 90]), np.radians(40))
+    found = measurements(UP, tilted * 1.0005, [[1, 2], [3, 4], [np.nan, 5], [-1, 6]], channel_names=("a", "b"))
+    assert (found.channels, found.isotropic, found.material) == (2, True, "measurements")
+    np.testing.assert_array_equal(found.mask, [True, True, False, False])
+    np.testing.assert_array_equal(found.values[1], [3, 4])
+    # scaled to length 1: the rounding of a division
+    np.testing.assert_allclose(np.linalg.norm(found.layout.wo, axis=-1), 1, rtol=4e-16)
+    np.testing.assert_array_equal(np.unique(found.layout.solid_angle()), [1.0])
+    assert measurements(UP, UP, np.ones(4), measure=np.arange(4)).channels == 1
+
+
+@pytest.mark.parametrize(
+    ("wrong", "says"),
+    [
+        ({"wi": UP[:3]}, r"wi must have shape \(4, 3\)"),
+        ({"wo": 2 * UP}, "wo must be unit vectors: number 0 .* of length 2"),
+        ({"wi": UP * np.nan}, "wi must be unit vectors"),
+        ({"values": np.ones((2, 2, 2))}, "values must have shape"),
+        ({"values": []}, "values must have shape"),
+        ({"measure": [1, 2, 3]}, "measure must be 4"),
+        ({"measure": [1, 2, 3, -1]}, "measure must be 4"),
+        ({"measure": np.zeros(4)}, "measure must be 4"),
+        ({"channel_names": ("a", "b")}, "2 channel names for 1"),
+    ],
+)
+def test_measurements_that_do_not_agree(wrong, says):
+    given = {"wi": UP, "wo": UP, "values": np.ones(4)} | wrong
+    with pytest.raises(ValueError, match=says):
+        measurements(given.pop("wi"), given.pop("wo"), given.pop("values"), **given)
