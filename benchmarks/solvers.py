@@ -183,7 +183,7 @@ def page(table: brdfit.Table, results: list[dict[str, Any]]) -> str:
         "",
         "Where the time goes, beside one evaluation of the fitted model on the fitted cells as separate directions: as",
         "users call it, `ready(model)(wi, wo)`, and its formula alone, with cosines and positions in tables given. A gram",
-        "pass is residuals, Jacobian and normal equations over every cell. It takes two threads, as the passes do in which a",
+        "pass is residuals, Jacobian and normal equations over every cell. It takes two threads, as passes do in which a",
         "fit asks every cell; evaluations take all cores. The solve takes one, so that fits run side by side.",
         "",
         "| model | data pass | solve | gram pass | `ready(model)(wi, wo)` | formula alone |",
