@@ -14,12 +14,18 @@ import os
 import platform
 import statistics
 import sys
+import tempfile
 import time
+from collections.abc import Callable
 from datetime import date
 from pathlib import Path
+from typing import Any
 
 import brdfit
 from brdfit.data import published_abc, published_materials, published_sgd
+from brdfit.fitting.effort import Effort
+from brdfit.fitting.fit_table import prepare
+from brdfit.reports import write_fits
 
 MODELS = ("gtr", "abc", "sgd", "ward", "ashikhmin_shirley")
 PUBLISHED = {"abc": published_abc, "sgd": published_sgd}
@@ -39,6 +45,57 @@ def rows(tables: list[Path]) -> list[tuple[str, dict[str, brdfit.Fit], dict[str,
         out.append((table.material, fits, published))
         print(f"{len(out)}/{len(tables)} {table.material}", file=sys.stderr, flush=True)
     return out
+
+
+def processor(run: Callable[[], Any]) -> float:
+    """Processor seconds of a call, of all threads."""
+    begin = time.process_time()
+    run()
+    return time.process_time() - begin
+
+
+def parts(tables: list[Path]) -> dict[str, list[dict[str, float]]]:
+    """Processor seconds of each part of a fit from file to file, by model, everything compiled; one after the other."""
+    out: dict[str, list[dict[str, float]]] = {m: [] for m in MODELS}
+    quick = Effort(error_bars=False)
+    for path in [tables[0], *tables]:  # the first time compiles
+        table = brdfit.load(path)
+        shared = {"read": processor(lambda p=path: brdfit.load(p)), "prepare": processor(lambda t=table: prepare(t))}
+        for m in MODELS:
+            fits: list[brdfit.Fit] = []
+            search = processor(lambda t=table, m=m: brdfit.fit(t, m, effort=quick))
+            whole = processor(lambda t=table, m=m, f=fits: f.append(brdfit.fit(t, m)))
+            with tempfile.TemporaryDirectory() as folder:
+                write = processor(lambda f=fits, d=folder: write_fits(d, f, {}))
+            each = {n: v / len(MODELS) for n, v in shared.items()}
+            out[m].append(each | {"search, every cell asked once": search, "error bars": whole - search, "write": write})
+    return {m: rows[1:] for m, rows in out.items()}
+
+
+def profile(tables: list[Path]) -> list[str]:
+    """Where the time of a batch goes, as Markdown."""
+    found = parts(tables)
+    names = list(found[MODELS[0]][0])
+    lines = [
+        "## Where the time of a batch goes",
+        "",
+        f"Processor seconds of all threads for one material and model, medians of {len(tables)} materials, everything",
+        "compiled, one fit after the other. Reading and preparing a table is shared by its five models, a fifth each.",
+        "",
+        "| model | " + " | ".join(names) + " | together |",
+        "|---|" + "---|" * (len(names) + 1),
+    ]
+    together = []
+    for m, rows in found.items():
+        middle = [statistics.median(r[n] for r in rows) for n in names]
+        together.append(sum(middle))
+        lines.append(f"| {m} | " + " | ".join(f"{v:.3f}" for v in middle) + f" | {sum(middle):.2f} |")
+    mean = statistics.mean(together)
+    return [
+        *lines,
+        "",
+        f"Mean {mean:.2f}: with {os.cpu_count()} cores no less than {mean / (os.cpu_count() or 1):.2f} s a pair.",
+    ]
 
 
 def page(
@@ -100,8 +157,11 @@ def main() -> None:
         with args.best_known.open(newline="") as file:
             best = {(r["material"], r["model"]): float(r["error"]) for r in csv.DictReader(file)}
     start = time.perf_counter()
-    results = rows(sorted(args.tables.glob("*.binary")))
-    args.out.write_text(page(results, best, time.perf_counter() - start), encoding="utf-8")
+    tables = sorted(args.tables.glob("*.binary"))
+    results = rows(tables)
+    took = time.perf_counter() - start
+    text = page(results, best, took) + "\n" + "\n".join(profile(tables[:: max(len(tables) // 5, 1)])) + "\n"
+    args.out.write_text(text, encoding="utf-8")
     print(args.out)
 
 
