@@ -19,8 +19,10 @@ from ..models import BRDF, parameters_of
 from ..models.abc import ABC
 from ..models.ashikhmin_shirley import AshikhminShirley, AshikhminShirleyAnisotropic
 from ..models.fresnel import dielectric_f0
+from ..models.htsg import HTSG
 from ..models.parts import Composition
 from ..models.sgd import SGD
+from ..models.stam_diffraction import StamDiffraction
 
 Scalars = dict[str, Array]
 Map = Callable[[Scalars], Scalars]
@@ -243,6 +245,22 @@ def _abc_chart() -> Chart:
     return replace(chart, coordinates=coordinates)
 
 
+def _wave_chart(cls: type[BRDF]) -> Chart:
+    """The lobe's scale by specular F(0), which a fit can tell from the index, while specular would run against it: F(0)
+    runs from 2.5e-5 to 1.
+    """
+    plain = plain_chart(cls)
+
+    def to_parameters(x: Scalars) -> Scalars:
+        p = plain.to_parameters(x)
+        return {**p, "specular": p["specular"] / dielectric_f0(p["ior"])}
+
+    def from_parameters(p: Scalars) -> Scalars:
+        return plain.from_parameters({**p, "specular": p["specular"] * dielectric_f0(p["ior"])})
+
+    return _rewritten(plain, to_parameters, from_parameters)
+
+
 def _sgd_chart() -> Chart:
     """specular f0 and specular f1 in place of f0 and f1: the BRDF is linear in them, and some channels have their optimum
     at specular -> 0 with specular f0 finite, where f0 is infinite.
@@ -276,6 +294,8 @@ def charts(cls: type[BRDF], plain: bool = False, bounds: tuple[tuple[str, float,
             return (_abc_chart(),)
         if cls is SGD:
             return (_sgd_chart(),)
+        if cls in (HTSG, StamDiffraction):
+            return (_wave_chart(cls),)
         if cls in (AshikhminShirley, AshikhminShirleyAnisotropic):
             return (_with_trade_off(plain_chart(cls)),)
     return (plain_chart(cls, bounds),)

@@ -23,7 +23,8 @@ class Effort:
     """Share of the table that an exact search looks at, in (0, 1]: below 1 it is a subsample. Error bars and errors are
     always those of all cells."""
     shapes: float = 1.0
-    """Share of the model's starting shapes that are tried, in (0, 1], spread over all of them."""
+    """Share of the model's starting shapes that are tried, in [0, 1], spread over all of them. 0: the start that is given
+    alone, or the first shape if none is."""
     starts: int = 7
     """How many starts are polished after their colours were fitted, of each chart; at least 1. Seven find the best
     optimum of every synthetic truth and of 200 pairs of real materials and models; five miss a channel of ``sgd-00``, three
@@ -41,8 +42,8 @@ class Effort:
             raise ValueError(f"effort: nodes must be at least 2, not {self.nodes}")
         if not 0 < self.cells <= 1:
             raise ValueError(f"effort: cells must lie in (0, 1], not {self.cells:g}")
-        if not 0 < self.shapes <= 1:
-            raise ValueError(f"effort: shapes must lie in (0, 1], not {self.shapes:g}")
+        if not 0 <= self.shapes <= 1:
+            raise ValueError(f"effort: shapes must lie in [0, 1], not {self.shapes:g}")
         if self.starts < 1:
             raise ValueError(f"effort: starts must be at least 1, not {self.starts}")
         if not 0 < self.rtol < 1:

@@ -217,11 +217,11 @@ def _fit(
             )
         box = tuple(sorted((n, float(a), float(b)) for n, (a, b) in bounds.items()))
         forms = charts(cls, bool(held), box)
-        proposals = list(starts(cls, ready.summary, seed))
-        count = math.ceil(effort.shapes * len(proposals))
-        proposals = [proposals[i * len(proposals) // count] for i in range(count)]
+        every = list(starts(cls, ready.summary, seed))
+        count = max(math.ceil(effort.shapes * len(every)), 0 if given else 1)
+        proposals = [every[i * len(every) // count] for i in range(count)]
         if given:
-            proposals.insert(0, {**proposals[0], **_per_channel(cls, given, table.channels)})
+            proposals.insert(0, {**every[0], **_per_channel(cls, given, table.channels)})
         proposals = [{**p, **_per_channel(cls, held, table.channels)} for p in proposals]
         named = ready.losses
         if effort.error_bars:

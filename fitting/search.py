@@ -8,7 +8,7 @@ from typing import Any, NamedTuple
 
 import equinox as eqx
 import numpy as np
-from jaxtyping import Float
+from jaxtyping import Float, Int
 from numpy.typing import NDArray
 
 from ..programs import program
@@ -32,27 +32,30 @@ SAME = 1e-3
 WORTH = 1.3
 """An optimum of the coarse table is carried on if its cost is below this multiple of the best one's."""
 MAX_STEPS = 300
+COLOUR_STEPS = 10
+"""Steps of a refit of colours, at most: nearly all take 3 to 9, and of a lobe too narrow to matter 50 and more."""
 RUN = 8
 """Starts, neighbours in shape, whose colours are fitted one after another; runs go side by side."""
 
 
 class Stage(eqx.Module):
-    """How much of the table a search looks at, when it stops, and how careful its first step is."""
+    """How much of the table a search looks at, when it stops, how careful its first step is, and how many it may take."""
 
     span: Span
     rtol: Float[Any, ""]
     damping: Float[Any, ""]
+    steps: Int[Any, ""]
 
     @staticmethod
-    def of(span: Span, rtol: float, damping: float) -> Stage:
+    def of(span: Span, rtol: float, damping: float, steps: int = MAX_STEPS) -> Stage:
         """A stage, its numbers as arguments of the compiled program."""
-        return Stage(span, np.asarray(rtol), np.asarray(damping))
+        return Stage(span, np.asarray(rtol), np.asarray(damping), np.asarray(steps))
 
 
 @program
 def solve(problem: Problem, x: Float[Any, " n"], box: Box, stage: Stage) -> Minimum:
     """Minimise from x. One program for coarse and whole tables and for any bounds."""
-    return minimise(gram_residual(problem, stage.span), x, box, stage.rtol, stage.damping, MAX_STEPS)
+    return minimise(gram_residual(problem, stage.span), x, box, stage.rtol, stage.damping, stage.steps)
 
 
 @dataclass(frozen=True)
@@ -93,7 +96,7 @@ def search(problems: list[tuple[Problem, Box, list[NDArray[np.float64]]]], effor
     part = Span.nodes if fast else Span.cells
     blocks = samples.compressed if fast else max(1, round(effort.cells * samples.blocks))
     coarse = (
-        Stage.of(part(samples, min(COLOUR_BLOCKS[fast], blocks)), 1e-2, 1e-2),
+        Stage.of(part(samples, min(COLOUR_BLOCKS[fast], blocks)), 1e-2, 1e-2, COLOUR_STEPS),
         Stage.of(part(samples, min(COARSE_BLOCKS[fast], blocks)), 1e-6, 1.0),
     )
     whole = Stage.of(part(samples, blocks), effort.rtol, 1e-6)

@@ -126,7 +126,7 @@ class BoxLevenbergMarquardt(optx.AbstractGaussNewton[Any, Any, Any]):
 
     Successful when an accepted, hardly damped step lowers the cost by less than ``rtol`` relative or by no more than
     rounding, when ``patience`` steps in a row were rejected (the cost is flat to rounding), or when the residual itself is
-    rounding.
+    rounding. It stops after ``max_steps``, too: an argument of the program, where the library's own limit is a part of it.
     """
 
     rtol: Any
@@ -136,9 +136,18 @@ class BoxLevenbergMarquardt(optx.AbstractGaussNewton[Any, Any, Any]):
     search: optx.LinearTrustRegion[Any]
     verbose: Callable[..., None]
     patience: int
+    max_steps: Array | float
 
-    def __init__(self, box: Box, rtol: Array | float, damping: Array | float = 1.0, patience: int = 10) -> None:
+    def __init__(
+        self,
+        box: Box,
+        rtol: Array | float,
+        damping: Array | float = 1.0,
+        patience: int = 10,
+        max_steps: Array | float = jnp.inf,
+    ) -> None:
         self.rtol = rtol
+        self.max_steps = max_steps
         self.atol = 0.0
         self.norm = optx.max_norm
         self.descent = BoxDescent(box, damping)
@@ -162,7 +171,7 @@ class BoxLevenbergMarquardt(optx.AbstractGaussNewton[Any, Any, Any]):
         # A step damped down to nothing counts as accepted, and would be for ever (tests/test_solver.py::test_stops_at_once).
         still = accepted & ~state.first_step & jnp.all(new_y == y)
         hopeless = new.num_steps_since_acceptance >= self.patience
-        done = stalled | still | hopeless | (after <= rounding**2)
+        done = stalled | still | hopeless | (after <= rounding**2) | (new.num_steps >= self.max_steps)
         return new_y, eqx.tree_at(lambda s: s.terminate, new, done), aux
 
 
@@ -183,11 +192,11 @@ class Minimum(eqx.Module):
 
 
 def minimise(
-    residual: Callable[[Vector], Array], x: Vector, box: Box, rtol: Array, damping: Array, max_steps: int
+    residual: Callable[[Vector], Array], x: Vector, box: Box, rtol: Array, damping: Array, max_steps: Array | int
 ) -> Minimum:
     """Minimise |residual(x)|^2 over a box, from an x inside it."""
-    solver = BoxLevenbergMarquardt(box, rtol, damping)
-    solution: Any = optx.least_squares(lambda y, _: residual(y), solver, x, max_steps=max_steps, throw=False)
+    solver = BoxLevenbergMarquardt(box, rtol, damping, max_steps=max_steps)
+    solution: Any = optx.least_squares(lambda y, _: residual(y), solver, x, max_steps=None, throw=False)
     end = solution.state.f_info
     columns = end.jac.as_matrix()
     gradient, cost = columns.T @ end.residual, jnp.sum(end.residual**2)
@@ -196,8 +205,9 @@ def minimise(
     size = jnp.sum(columns**2, 0) * cost
     moves = box.free & ~outward & (size > 0)
     cosine = jnp.where(moves, jnp.abs(gradient) / jnp.sqrt(jnp.where(moves, size, 1.0)), 0.0)
-    stopped = solution.result == optx.RESULTS.successful
-    return Minimum(x, cost, jnp.max(cosine, initial=0.0), solution.stats["num_steps"], stopped, _scale(columns, x))
+    steps = solution.stats["num_steps"]
+    stopped = (solution.result == optx.RESULTS.successful) & (steps < max_steps)
+    return Minimum(x, cost, jnp.max(cosine, initial=0.0), steps, stopped, _scale(columns, x))
 
 
 def _on_bound(x: Vector, box: Box) -> Vector:
