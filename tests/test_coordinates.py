@@ -14,7 +14,7 @@ from brdfit.models import MODELS, parameters_of
 from brdfit.models.gtr import GTR
 from brdfit.models.sgd import SGD
 
-FORMS = [cls for name in RANGES for cls in MODELS[name]]
+FORMS = [cls for name in (*RANGES, "htsg", "stam_diffraction") for cls in MODELS[name]]
 """The models that have charts of their own, and Ward for all those that have the plain one."""
 CASES = [(cls, plain, k) for cls in FORMS for plain in (False, True) for k in range(len(charts(cls, plain)))]
 charted = pytest.mark.parametrize(

@@ -52,6 +52,14 @@ def test_a_subsample_is_worse_and_says_so(table):
         np.testing.assert_allclose(part.stderr[name], value, rtol=0.3)
 
 
+def test_from_the_given_start_alone(table):
+    """With no shapes of its own a search begins where it is told, and in nothing else."""
+    near = brdfit.fit(table, "ward", start={"alpha": 0.2}, effort=Effort(shapes=0))
+    assert near.starts == 1
+    assert near.errors["log"] == pytest.approx(brdfit.fit(table, "ward").errors["log"], rel=1e-6)
+    assert brdfit.fit(table, "ward", effort=Effort(shapes=0)).starts == 1
+
+
 def test_without_error_bars(table):
     """The same optimum and errors; nothing is said of how sure they are, and a report can be made of it."""
     bare, whole = (brdfit.fit(table, "ward", effort=Effort(error_bars=b)) for b in (False, True))
