@@ -56,6 +56,10 @@ class AshikhminShirley(BRDF):
         shapes = [{"exponent": float(np.clip(exponent * k, 2e-3, 5e6))} for k in (0.1, 0.3, 1.0, 3.0, 10.0)]
         return shapes + [{"exponent": e} for e in (0.05, 1.0, 5.0)]
 
+    def normal_reflectance(self) -> Float[Array, ""]:
+        """F0, a parameter of the model."""
+        return self.specular
+
     def evaluate(self, g: Geometry) -> Float[Array, "..."]:
         """Value in 1/sr."""
         d = ndf.power_cosine(g.sin2_h, g.cos2_h, self.exponent)
@@ -81,6 +85,10 @@ class AshikhminShirleyAnisotropic(BRDF):
     def shapes(cls, half_width: float) -> list[dict[str, float]]:
         """Those of the round lobe, stretched."""
         return stretched_shapes(AshikhminShirley.shapes(half_width), "exponent")
+
+    def normal_reflectance(self) -> Float[Array, ""]:
+        """F0, a parameter of the model."""
+        return self.specular
 
     def evaluate(self, g: Geometry) -> Float[Array, "..."]:
         """Value in 1/sr."""

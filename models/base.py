@@ -110,6 +110,10 @@ class BRDF(eqx.Module):
         """
         return None
 
+    def normal_reflectance(self) -> Float[Array, ""] | None:
+        """F0, the reflectance of a facet at normal incidence, for one channel; None where nothing corresponds to it."""
+        return None
+
     @abc.abstractmethod
     def evaluate(self, g: Geometry) -> Float[Array, "..."]:
         """BRDF in 1/sr for directions above the horizon, with every parameter a scalar (one channel at a time)."""

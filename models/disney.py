@@ -54,9 +54,9 @@ def _coat(m: Any, g: Geometry) -> Value:
     return value
 
 
-def _reflectance(m: Any, g: Geometry) -> Value:
-    f0 = 0.08 * m.specular * (1 - m.metallic) + m.base_color * m.metallic
-    return schlick(f0, g)
+def _f0(m: Any) -> Value:
+    value: Value = 0.08 * m.specular * (1 - m.metallic) + m.base_color * m.metallic
+    return value
 
 
 class Disney(BRDF):
@@ -90,11 +90,15 @@ class Disney(BRDF):
     clearcoat: Float[Array, ""] = _share("strength of the clear coat", linear=True)
     clearcoat_gloss: Float[Array, ""] = _share("from satin (0) to gloss (1)", 1.0)
 
+    def normal_reflectance(self) -> Value:
+        """F0 under the clear coat: mix(0.08 specular, base_color, metallic)."""
+        return _f0(self)
+
     def evaluate(self, g: Geometry) -> Float[Array, "..."]:
         """Value in 1/sr."""
         d = ndf.GGX(jnp.maximum(self.roughness**2, 1e-3))(g.sin2_h, g.cos2_h)
         visible = _visibility(((1 + self.roughness) / 2) ** 2, g)
-        return _body(self, g) + _reflectance(self, g) * (d * visible) + _coat(self, g)
+        return _body(self, g) + schlick(_f0(self), g) * (d * visible) + _coat(self, g)
 
 
 class DisneyAnisotropic(BRDF):
@@ -117,6 +121,10 @@ class DisneyAnisotropic(BRDF):
     clearcoat: Float[Array, ""] = _share("strength of the clear coat", linear=True)
     clearcoat_gloss: Float[Array, ""] = _share("from satin (0) to gloss (1)", 1.0)
 
+    def normal_reflectance(self) -> Value:
+        """F0 under the clear coat: mix(0.08 specular, base_color, metallic)."""
+        return _f0(self)
+
     def evaluate(self, g: Geometry) -> Float[Array, "..."]:
         """Value in 1/sr."""
         aspect = jnp.sqrt(1 - 0.9 * self.anisotropy)
@@ -124,4 +132,4 @@ class DisneyAnisotropic(BRDF):
         x2, y2 = g.tangential()
         d = (1 / (ax * ay)) / (x2 / ax**2 + y2 / ay**2 + g.cos2_h) ** 2 / jnp.pi
         visible = _visibility(((1 + self.roughness) / 2) ** 2, g)
-        return _body(self, g) + _reflectance(self, g) * (d * visible) + _coat(self, g)
+        return _body(self, g) + schlick(_f0(self), g) * (d * visible) + _coat(self, g)

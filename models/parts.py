@@ -6,9 +6,10 @@ from collections.abc import Callable
 from dataclasses import dataclass
 from typing import Any, ClassVar
 
+import jax.numpy as jnp
 from jaxtyping import Array, Float
 
-from ..geometry import Geometry
+from ..geometry import Geometry, from_directions
 from .base import BRDF
 from .diffuse import lambert
 from .masking.smith import NDF
@@ -102,6 +103,11 @@ class Composition(BRDF):
     parts: ClassVar[Parts]
     effects: ClassVar[tuple[str, ...]] = ()
     """The effects of ``brdfit.compose`` that it consists of; none for parts from elsewhere."""
+
+    def normal_reflectance(self) -> Field | None:
+        """F0: F of the lobe, with its scale, at normal incidence; None without a lobe."""
+        normal = jnp.zeros(3).at[2].set(1)
+        return self.parts.lobes[0].reflectance(self, from_directions(normal, normal)) if self.parts.lobes else None
 
     def evaluate(self, g: Geometry) -> Field:
         """Value in 1/sr."""

@@ -68,6 +68,10 @@ class Schlick(BRDF):
         """Narrower and wider than the lobe is, which halves where sin^2/cos^2 = 0.41 r."""
         return [{"roughness": r} for r in _roughnesses(half_width)]
 
+    def normal_reflectance(self) -> Float[Array, ""]:
+        """F0, a parameter of the model."""
+        return self.specular
+
     def evaluate(self, g: Geometry) -> Float[Array, "..."]:
         """Value in 1/sr."""
         return schlick(self.specular, g) * _directional(self.roughness, g)
@@ -93,6 +97,10 @@ class SchlickTwoLayers(BRDF):
     def shapes(cls, half_width: float) -> list[dict[str, float]]:
         """Those of one layer over two bodies."""
         return [{"roughness": r, "base_roughness": b} for r in _roughnesses(half_width) for b in (0.2, 0.9)]
+
+    def normal_reflectance(self) -> Float[Array, ""]:
+        """F0 of the upper layer."""
+        return self.specular
 
     def evaluate(self, g: Geometry) -> Float[Array, "..."]:
         """Value in 1/sr."""

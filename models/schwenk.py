@@ -42,6 +42,10 @@ class Schwenk(BRDF):
         smooth = [max(0.1, min(1 + 1 / 255 - 2 / e["exponent"], 0.999)) for e in exponent_shapes(half_width)[:5]]
         return [{"smoothness": s, "scale": k} for s in smooth for k in (0.1, 1.0, 10.0)]
 
+    def normal_reflectance(self) -> Float[Array, ""]:
+        """F0, a parameter of the model."""
+        return self.specular
+
     def evaluate(self, g: Geometry) -> Float[Array, "..."]:
         """Value in 1/sr."""
         s = self.smoothness

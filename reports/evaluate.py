@@ -23,27 +23,22 @@ def evaluate(model: BRDF | None, wi: Reals, wo: Reals, count: int) -> Reals:
         return np.full((len(wi), count), np.nan)
     import jax
 
-    n = -(-len(wi) // BLOCK) * BLOCK
-    pad = np.zeros((n, 3))
+    n = -(-len(wi) // BLOCK)
+    pad = np.zeros((n * BLOCK, 3))
     pad[:, 2] = 1.0
     blocks = []
     for w in (wi, wo):
         full = pad.copy()
         full[: len(w)] = w
-        blocks.append(full.reshape(-1, BLOCK, 3))
+        blocks.append(full.reshape(n, BLOCK, 3))
     with jax.enable_x64(True):
-        out = np.asarray(_program()(model, *blocks))
-    return np.broadcast_to(out.reshape(n, -1)[: len(wi)], (len(wi), count))
+        out = np.concatenate([_program()(model, *pair) for pair in zip(*blocks, strict=True)])
+    return np.broadcast_to(out[: len(wi)], (len(wi), count))
 
 
 @cache
 def _program() -> Any:
     """The one compiled function, made on first use so that rebuilding a report does not import JAX for it."""
-    import jax
-
     from ..programs import program
 
-    def run(model: BRDF, wi: Any, wo: Any) -> Any:
-        return jax.lax.map(lambda pair: model(*pair), (wi, wo))
-
-    return program(run)
+    return program(lambda model, wi, wo: model(wi, wo))

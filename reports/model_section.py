@@ -28,25 +28,23 @@ def anchor(f: Fit, label: str) -> str:
 
 def physics_view(f: Fit, label: str, evidence: Evidence | None, rows: dict[str, int]) -> View:
     """The row of one model in the table of physical meanings; ``rows`` are the places of fits in the evidence."""
-    f0 = physics.normal_reflectance(f.model_name, f.parameters)
-    width = physics.lobe_width(f.model_name, f.parameters)
+    f0 = physics.normal_reflectance(f.model)
+    width = physics.lobe_width(f.model)
     view: View = {"label": label, "f0": None, "width": None, "energy": "not computed", "energy_warn": False}
     if f0 is not None:
         view["f0"] = {
-            "value": words.triple(f0.value),
-            "expression": f0.expression,
-            "remark": f0.remark,
-            "kind": materials.kind_of(f0.value),
-            "warn": bool(materials.GAP[0] < float(np.mean(f0.value)) < materials.GAP[1] or np.mean(f0.value) > 1),
+            "value": words.triple(f0),
+            "kind": materials.kind_of(f0),
+            "warn": bool(materials.GAP[0] < float(np.mean(f0)) < materials.GAP[1] or np.mean(f0) > 1),
             "nearest": None,
         }
-        if f0.value.shape == (3,) and np.isfinite(f0.value).all():
-            substance, distance = materials.nearest(f0.value)
+        if f0.shape == (3,) and np.isfinite(f0).all():
+            substance, distance = materials.nearest(f0)
             view["f0"]["nearest"] = substance.name
             view["f0"]["nearest_value"] = " ".join(f"{v:.3g}" for v in substance.f0)
             view["f0"]["distance"] = significant(distance, 2)
             view["f0"]["far"] = distance > 0.15
-            view["f0"]["swatch"], view["f0"]["nearest_swatch"] = _hex(f0.value), _hex(np.array(substance.f0))
+            view["f0"]["swatch"], view["f0"]["nearest_swatch"] = _hex(f0), _hex(np.array(substance.f0))
     if width is not None:
         view["width"] = {
             "half": significant(math.degrees(width.half_width), 3),

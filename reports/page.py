@@ -372,7 +372,7 @@ def _references(fits: Sequence[Fit], evidence: Sequence[Evidence]) -> list[View]
         add(references.OF_LOSS.get(f.loss, ()), f"loss {f.loss}")
         if f.source.endswith(".binary"):
             add(("merl",), "data")
-        if physics.normal_reflectance(f.model_name, f.parameters) is not None:
+        if physics.normal_reflectance(f.model) is not None:
             add(("hoffman2013",), "F0 of substances")
     if any(math.isfinite(perceptual(f)) for f in fits):
         add(references.OF_LOSS["perceptual"], "ranking")

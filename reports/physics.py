@@ -2,14 +2,20 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Mapping
+from collections.abc import Callable
 from dataclasses import dataclass
+from functools import cache
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
+from ..angles import directions
 from ..quadrature import gauss_legendre
 from .evaluate import evaluate
+
+if TYPE_CHECKING:
+    from ..models import BRDF
 
 Reals = NDArray[np.float64]
 
@@ -108,31 +114,25 @@ def energy_verdict(rho: Reals, error: Reals, angles: tuple[float, ...] = ANGLES)
     return f"returns more light than falls on it: albedo ≤ 1 {until}, {top[worst]:.2f} at {angles[worst]:g}°"
 
 
-@dataclass(frozen=True)
-class NormalReflectance:
-    """What corresponds to F0 in a model: ``value`` ``[C]``, the expression it came from, and how far to trust it."""
+def normal_reflectance(model: BRDF | None) -> Reals | None:
+    """F0 of a fitted model, ``[C]``; None where the model has nothing that corresponds to it."""
+    if model is None:
+        return None
+    import jax
 
-    value: Reals
-    expression: str
-    remark: str
+    from ..models import channels
+
+    with jax.enable_x64(True):
+        values = [_channel(model, c).normal_reflectance() for c in range(channels(model))]
+    return None if values[0] is None else np.array(values, float)
 
 
-def normal_reflectance(model: str, parameters: Mapping[str, Reals]) -> NormalReflectance | None:
-    """F0 of a fitted model by its name and parameters; None where the model has nothing that corresponds to it."""
-    p = parameters
-    composed = "lobe" in model.split("+")
-    if (composed or model in ("gtr", "ggx", "pbr", "cook_torrance", "ashikhmin_shirley")) and "specular" in p:
-        return NormalReflectance(np.atleast_1d(p["specular"]), "specular", "a parameter of the model")
-    if model == "abc" and {"specular", "ior"} <= set(p):
-        n = p["ior"]
-        value = np.atleast_1d(p["specular"] * ((n - 1) / (n + 1)) ** 2)
-        return NormalReflectance(value, "specular · F(ior, 0°)", "scale of the lobe: F0 so far as its normalised D is right")
-    if model == "sgd" and {"specular", "f0", "f1"} <= set(p):
-        value = np.atleast_1d(p["specular"] * (p["f0"] - p["f1"]))
-        return NormalReflectance(
-            value, "specular · (f0 \u2212 f1)", "scale of the lobe: F0 so far as its normalised D is right"
-        )
-    return None
+def _channel(model: BRDF, c: int) -> BRDF:
+    """The model of one channel: every parameter a scalar."""
+    import jax
+
+    found: BRDF = jax.tree.map(lambda x: np.atleast_1d(x)[min(c, np.size(x) - 1)], model)
+    return found
 
 
 @dataclass(frozen=True)
@@ -140,9 +140,14 @@ class Width:
     """Width of a lobe by several names. Where channels differ, the first channel's."""
 
     half_width: float
-    """Angle of the half vector at which D has fallen to half its peak, radians."""
-    alpha: float
-    """alpha of the GGX lobe of the same half-width (its own alpha for gtr with gamma = 2)."""
+    """Angle of the half vector at which the lobe has fallen to half its peak, radians."""
+
+    @property
+    def alpha(self) -> float:
+        """alpha of the GGX lobe of the same half-width."""
+        # GGX: (s^2 + a^2 (1 - s^2))^2 = 2 a^4 at half the peak
+        sin2 = np.sin(self.half_width) ** 2
+        return float(np.sqrt(sin2 / (np.sqrt(2) - 1 + sin2)))
 
     @property
     def roughness(self) -> float:
@@ -155,49 +160,55 @@ class Width:
         return 2 / self.alpha**2 - 2
 
 
-def lobe_width(model: str, parameters: Mapping[str, Reals]) -> Width | None:
-    """Width of the lobe of a fitted model; None for models without one, or where D never falls to half its peak."""
-    sin2 = _half_sin2(model, {k: np.atleast_1d(v)[0] for k, v in parameters.items()})
-    if sin2 is None or not 0 < sin2 < 1:
+THETA_H = np.concatenate([[0.0], np.geomspace(1e-9, np.radians(60), 1600)])
+"""Where a lobe is asked for its width, radians."""
+THETA_D = np.radians(20)
+"""At what theta_d it is asked for, and phi_d = 90 degrees, where it is not known apart from the body."""
+PROMINENT = 2.0
+"""What such a lobe is at least, as a multiple of the value at 60 degrees: bodies are up to 1.7 of it
+(tests/test_report_physics.py::test_no_half_width_no_number)."""
+
+
+def lobe_width(model: BRDF | None) -> Width | None:
+    """Width of the lobe of a fitted model; None without one, on anisotropic models, and where it is wider than 60 degrees.
+
+    A model of microfacets is asked for its distribution D; any other for its values, of which that at theta_h = 60 degrees
+    is taken for the body's, if the lobe stands out from it.
+    """
+    if model is None or model.anisotropic:
         return None
-    # GGX: (s^2 + a^2 (1 - s^2))^2 = 2 a^4 at half the peak
-    alpha = np.sqrt(sin2 / (np.sqrt(2) - 1 + sin2))
-    return Width(float(np.arcsin(np.sqrt(sin2))), float(alpha))
+    from ..models import channels
+    from ..models.parts import Composition
+
+    base = 0.0
+    if isinstance(model, Composition) and model.parts.lobes:
+        import jax
+
+        with jax.enable_x64(True):
+            facets = model.parts.lobes[0].facets(_channel(model, 0))
+            values = np.asarray(_program()(facets, np.sin(THETA_H) ** 2, np.cos(THETA_H) ** 2))
+    else:
+        values = evaluate(model, *directions(THETA_H, THETA_D, np.pi / 2), channels(model))[:, 0]
+        base = values[-1]
+        if values[0] < PROMINENT * base:
+            return None
+    half = half_way(values, base)
+    return None if half is None else Width(half)
 
 
-def _half_sin2(model: str, p: Mapping[str, float]) -> float | None:
-    """sin^2 of the angle at which D is half its peak."""
-    if (model in ("gtr", "ggx", "pbr") or "lobe" in model.split("+")) and "alpha" in p:
-        a2 = p["alpha"] ** 2
-        grow = np.expm1(np.log(2) / p.get("gamma", 2.0))
-        return float(a2 * grow / (1 - a2)) if a2 < 1 else None
-    if model == "abc" and {"b", "c"} <= set(p):
-        v = np.expm1(np.log(2) / p["c"]) / p["b"] if p["c"] > 1e-2 else np.inf
-        return float(v * (2 - v)) if v < 1 else None
-    if model == "sgd" and {"alpha", "p"} <= set(p):
-        t = _sgd_half_tan2(p["alpha"], p["p"])
-        return None if t is None else t / (1 + t)
-    if model.startswith("ward") and "alpha" in p:
-        t = p["alpha"] ** 2 * np.log(2)
-        return float(t / (1 + t))
-    if model in ("ashikhmin_shirley", "blinn_phong") and "exponent" in p:
-        return float(-np.expm1(-2 * np.log(2) / p["exponent"])) if p["exponent"] > 0 else None
-    return None
+@cache
+def _program() -> Any:
+    """The distribution D of facets, compiled; made on first use so that a module that needs no JAX does not import it."""
+    from ..programs import program
+
+    return program(lambda facets, sin2, cos2: facets(sin2, cos2))
 
 
-def _sgd_half_tan2(alpha: float, p: float) -> float | None:
-    """tan^2 at half the peak of D_sgd, first crossing on a logarithmic scan, then bisected."""
-
-    def log_ratio(t: NDArray[np.float64] | float) -> NDArray[np.float64]:
-        r: NDArray[np.float64] = -t / alpha - p * np.log1p(t / alpha**2) + 2 * np.log1p(t) + np.log(2)
-        return r
-
-    grid = np.logspace(-16, 4, 2001)
-    below = np.flatnonzero(log_ratio(grid) < 0)
+def half_way(values: Reals, base: float) -> float | None:
+    """The first theta_h at which ``values`` at :data:`THETA_H` have fallen half way from their first one to ``base``."""
+    below = np.flatnonzero(values <= (values[0] + base) / 2)
     if len(below) == 0 or below[0] == 0:
         return None
-    lo, hi = grid[below[0] - 1], grid[below[0]]
-    for _ in range(60):
-        middle = (lo + hi) / 2
-        lo, hi = (middle, hi) if log_ratio(middle) > 0 else (lo, middle)
-    return float((lo + hi) / 2)
+    k = below[0]
+    ends = slice(k - 1, k + 1)
+    return float(np.interp((values[0] + base) / 2, values[ends][::-1], THETA_H[ends][::-1]))

@@ -66,7 +66,7 @@ def test_f0_is_held_against_substances(report):
     text = Reader(report).text
     assert "0.950 0.640 0.540" in text
     assert "copper" in text
-    assert "no parameter that is a reflectance" in text  # ward
+    assert "nothing that is a reflectance" in text  # ward
 
 
 def test_without_evidence_the_report_says_what_is_missing(tmp_path, fits):
