@@ -19,11 +19,11 @@ if TYPE_CHECKING:
     from .models import parameter as parameter
     from .models.factory import microfacet as microfacet
     from .reports import report as report
-    from .scenes.ready import ready as ready
     from .tables import Table as Table
     from .tables import load as load
     from .tables import measurements as measurements
     from .tables import save as save
+    from .tabulated import ready as ready
 
 __version__ = "0.1.0"
 
@@ -47,7 +47,7 @@ _PUBLIC = {
     "model": "models",
     "parameter": "models",
     "preset": "data",
-    "ready": "scenes.ready",
+    "ready": "tabulated",
     "report": "reports",
     "save": "tables",
 }

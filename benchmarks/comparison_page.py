@@ -16,10 +16,10 @@ import brdfit
 import numpy as np
 from brdfit.models import MODELS, model, parameters_of
 from brdfit.reports.plots import new_figure, styled
+from brdfit.tabulated import read, tabulate
 from brdfit.tradeoff.evaluation import Evaluation, direct
 from brdfit.tradeoff.pareto import front
 from brdfit.tradeoff.sample import draw
-from brdfit.tradeoff.tabulated import from_table, tabulate
 from brdfit.tradeoff.timing import interleaved
 
 LOSSES = ("perceptual", "log", "ngan")
@@ -109,8 +109,8 @@ def costs(rows: list[Row], table: brdfit.Table) -> dict[str, float]:
     calls = {}
     for name, parameters in fits.items():
         plain = model(name, **parameters)
-        tabulated = tabulate(plain, sample.max_angle)
-        quick = Evaluation(from_table(sample.max_angle), tabulated, sample) if tabulated.tables else None
+        tabulated = tabulate(plain)
+        quick = Evaluation(read, tabulated, sample) if tabulated.tables else None
         calls[name] = quick or Evaluation(direct, plain, sample)
     times = interleaved(calls, REPEATS, 60.0)
     return {name: t.low / calls[name].count * 1e9 for name, t in times.items()}

@@ -13,6 +13,7 @@ from ..fitting.starts import summarise
 from ..models.effects import EFFECTS
 from ..progress import Progress
 from ..tables import Table
+from ..tabulated import ready
 from ..tradeoff.evaluation import Evaluation, Operations, direct
 from ..tradeoff.sample import Sample
 from ..tradeoff.timing import interleaved
@@ -22,7 +23,6 @@ from .difference import difference
 from .illumination import Illumination
 from .interpolated import measured
 from .pairs import shown
-from .ready import ready
 from .rendering import Rendered, render
 from .sampling import techniques_of
 from .scene import MEASURES, Reals, Scene

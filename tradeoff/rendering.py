@@ -10,10 +10,10 @@ import numpy as np
 from jaxtyping import Array
 
 from ..fitting import Fit
+from ..tabulated import read, tabulate
 from .evaluation import Evaluation, Operations, direct
 from .exchange import MASKINGS, PARTS
 from .sample import Sample
-from .tabulated import from_table, tabulate
 from .timing import Timing, interleaved
 
 Way = tuple[str, Callable[[Any, Array, Array], Array], Any]
@@ -54,7 +54,7 @@ def renderings(fits: Sequence[Fit], sample: Sample) -> list[Rendering]:
             ("integral" if integral else "", direct, fit.model)
         ]
         if integral and fit.model is not None:
-            ways.append(("table", from_table(sample.max_angle), tabulate(fit.model, sample.max_angle)))
+            ways.append(("table", read, tabulate(fit.model)))
         for masking, function, what in ways:
             for dtype, programs in (("float32", narrow), ("float64", wide)):
                 programs[name, masking] = Evaluation(function, what, sample, dtype)

@@ -19,10 +19,10 @@ from ..geometry import Geometry
 from ..models import BRDF, parameter_values
 from ..models.masking.smith import NDF, NODES, REACH, Rule, smith_correlated, smith_separable
 from ..quadrature import gauss_legendre, smith_kernel
+from ..tabulated import read, tabulate
 from .evaluation import Evaluation, direct
 from .exchange import MASKINGS, PARTS, Field, Masking, exchanged
 from .sample import Sample
-from .tabulated import from_table, tabulate
 from .timing import Timing, interleaved
 
 Reals = NDArray[np.float64]
@@ -102,8 +102,8 @@ def quadratures(fits: Sequence[Fit], sample: Sample, losses: Sequence[str]) -> l
             for n in counts:
                 what: Any = with_rule(m, rule, n)
                 programs[fit.model_name, rule, n] = Evaluation(direct, what, sample, "float64")
-        table = tabulate(m, sample.max_angle)
-        programs[fit.model_name, "table", NODES] = Evaluation(from_table(sample.max_angle), table, sample, "float64")
+        table = tabulate(m)
+        programs[fit.model_name, "table", NODES] = Evaluation(read, table, sample, "float64")
     seconds = interleaved(programs, REPEATS, BUDGET)
     values = {key: e.values() for key, e in programs.items()}
     own = {name: {k: sample.error(values[name, "even in u", NODES], k) for k in losses} for name in reference}
