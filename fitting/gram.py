@@ -349,9 +349,11 @@ def factor(g: Float[Array, "m m"]) -> Float[Array, "m m"]:
     By eigenvalues of the matrix scaled to unit diagonal: a Cholesky factor does not exist where a parameter has no effect
     (tests/test_gram.py::test_singular_gram). Eigenvalues below zero are rounding.
     """
-    diagonal = jnp.diag(g)
-    scale = jnp.sqrt(jnp.where(diagonal > 0, diagonal, 1.0))
-    values, vectors = jnp.linalg.eigh(g / scale[:, None] / scale)
+    scale = jnp.sqrt(jnp.maximum(jnp.diag(g), 0.0))
+    divisor = jnp.where(scale > 0, scale, 1.0)
+    values, vectors = jnp.linalg.eigh(g / divisor[:, None] / divisor)
+    # not the divisor: the eigenvalue 0 of a parameter without effect is 1e-17, whose root would pass for an effect
+    # (tests/test_gram.py::test_singular_gram)
     u: Array = jnp.sqrt(jnp.maximum(values, 0.0))[:, None] * vectors.T * scale
     return u
 

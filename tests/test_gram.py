@@ -219,6 +219,7 @@ def test_singular_gram():
         zero = np.asarray(factor(jnp.zeros((3, 3))))
     assert np.isfinite(u).all()
     np.testing.assert_allclose(u.T @ u, g, atol=1e-13 * g.max())
+    np.testing.assert_array_equal(u[:, 2], np.zeros(6))  # nothing of it is rounding, which a solver would follow
     np.testing.assert_array_equal(zero, np.zeros((3, 3)))
 
 
