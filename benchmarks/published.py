@@ -3,8 +3,8 @@
     python benchmarks/published.py TABLES --keep published.jsonl --out docs/published.md [--every 2]
 
 TABLES holds MERL .binary files, of which every N-th is taken. Each form is fitted twice to each of its materials, from the
-automatic starts and from the published parameters, without error bars (search_only.py). Where neither is as good as the
-published fit, ``brdfit.fit`` itself is asked. All errors are over all cells. Finished fits are kept as lines of JSON; an
+automatic starts and from the published parameters alone, without error bars. Where neither is as good as the published fit,
+one with all settings at their defaults is made. All errors are over all cells. Finished fits are kept as lines of JSON; an
 interrupted run goes on from them.
 """
 
@@ -28,15 +28,15 @@ import kept
 import numpy as np
 from brdfit.data import forms, preset, published_materials
 from brdfit.data.presets import STARTS, published_sgd_smith
-from brdfit.fitting.effort import Effort
-from brdfit.fitting.losses import LOSSES, Loss
+from brdfit.fitting import LOSSES, Effort, Loss
 from brdfit.models import parameter_values, parameters_of
 from brdfit.tradeoff.sample import draw
-from search_only import search
 
 E1 = replace(LOSSES["ngan"], name="E1", source="low2012", weigh=LOSSES["low"].weigh)
 """The first of Low's two losses: the residual of ``ngan`` with the weight of ``low``."""
-EFFORT = Effort(path="compressed", starts=3, rtol=1e-6)
+AUTOMATIC = Effort(path="compressed", starts=3, rtol=1e-6, error_bars=False)
+PUBLISHED = replace(AUTOMATIC, shapes=0)
+"""The same, from the given start alone."""
 MODEL = {form: name for name, form in STARTS.items()} | {
     form.replace("_E2", "_E1"): name for name, form in STARTS.items() if form.endswith("_E2")
 }
@@ -78,24 +78,24 @@ def compared(table: brdfit.Table, form: str) -> Row:
     start = parameter_values(published_sgd_smith(table.material) if form == "sgd" else old)
     theirs = brdfit.evaluate(table, old, loss=loss)[loss.name]
     found = {
-        "automatic": search(table, name, loss, EFFORT, cells=(loss,)),
-        "published_start": search(table, name, loss, EFFORT, start, cells=(loss,)),
+        "automatic": brdfit.fit(table, name, loss=loss, effort=AUTOMATIC),
+        "published_start": brdfit.fit(table, name, loss=loss, start=start, effort=PUBLISHED),
     }
-    errors = {key: f.of_cells[loss.name] for key, f in found.items()}
+    errors = {key: f.errors[loss.name] for key, f in found.items()}
     if min(errors.values()) > theirs * (1 + ROUNDING):
         errors["fit"] = brdfit.fit(table, name, loss=loss, start=start).errors[loss.name]
-    best = min(found.values(), key=lambda f: f.error)
+    best = min(found.values(), key=lambda f: f.errors[loss.name])
     return {
         "material": table.material,
         "form": form,
         "loss": loss.name,
         "published": theirs,
         **errors,
-        "seconds": {key: round(f.seconds, 3) for key, f in found.items()},
+        "seconds": {key: round(f.seconds["solve"], 3) for key, f in found.items()},
         "converged": all(f.converged for f in found.values()),
         "at_bound": list(best.at_bound),
         "outside": outside(name, start),
-        "parameters": {n: np.asarray(v).tolist() for n, v in parameter_values(best.model).items()},
+        "parameters": {n: v.tolist() for n, v in best.parameters.items()},
     }
 
 
