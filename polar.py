@@ -4,10 +4,10 @@ Smith masking is an integral for each polar angle. A table of a million cells ho
 function is smooth: it is evaluated at a few nodes, carried to a fine grid, and read off at the cells by a four-point
 (cubic Lagrange) stencil whose positions are computed once per table.
 
-Masking falls off towards the horizon within the width of the lobe, a milliradian for a mirror. In the distance x to the
-horizon it is smooth in ln x at every width, and grid and nodes are even in t, x = x_0 + w sinh(t): x_0 is where the table
-ends, 1e-5 from the horizon at the latest (closer, a function keeps the value that it has there), and w is where ln x gives
-way to x.
+Masking falls off towards the horizon within the width of the lobe, a milliradian for a mirror. In the distance to the
+horizon, here x = cos(theta)/(1 + sin(theta)), half of it in radians or nearly so, it is smooth in ln x at every width. Grid
+and nodes are even in t, x = x_0 + w sinh(t): x_0 is where the table ends, 1e-5 from the horizon at the latest (closer, a
+function keeps the value that it has there), and w is where ln x gives way to x.
 
 Tables for fits are made anew in every step, from 64 Chebyshev nodes: 3e-9 relative error of G1 up to 80 degrees, 1e-8 up to
 85, 5e-8 up to 89, 2e-7 up to 89.9 and 2e-6 up to 89.999. A table for pictures is made once (``fine``), directly at 4096
@@ -27,33 +27,39 @@ from jaxtyping import Array, Float, Int
 
 NODES = 64
 INTERVALS = {False: 1024, True: 4096}
-NARROWEST = {False: 1e-4, True: 1e-5}
-"""Smallest w, radians, by ``fine``: 64 nodes do not follow more of ln x."""
-CLOSEST = 1e-5
-"""Smallest distance to the horizon, radians: closer, Smith's integral itself loses its digits."""
+NARROWEST = {False: 5e-5, True: 5e-6}
+"""Smallest w by ``fine``: 64 nodes do not follow more of ln x."""
+CLOSEST = 5e-6
+"""Smallest x: closer, Smith's integral itself loses its digits."""
 
 
 def _distances(max_angle: float, fine: bool) -> tuple[float, float, float]:
     """x_0, w, and the end of t, at normal incidence."""
-    end = max(np.pi / 2 - max_angle, CLOSEST)
+    end = max(float(np.tan((np.pi / 2 - max_angle) / 2)), CLOSEST)
     width = max(end, NARROWEST[fine])
-    return end, width, float(np.arcsinh((np.pi / 2 - end) / width))
+    return end, width, float(np.arcsinh((1 - end) / width))
 
 
 @lru_cache(maxsize=8)
 def _tables(max_angle: float, fine: bool, dtype: str) -> tuple[np.ndarray, np.ndarray | None]:
     """cos of the nodes, and the matrix from them to the angles of the table; None where they are those angles."""
     end, width, top = _distances(max_angle, fine)
+
+    def cosines(place: np.ndarray) -> np.ndarray:
+        """From [-1, 1] along t."""
+        x = end + width * np.sinh((place + 1) / 2 * top)
+        return np.asarray(2 * x / (1 + x * x), dtype)
+
     uniform = np.linspace(-1, 1, INTERVALS[fine] + 1)
     if fine:
-        return np.sin(end + width * np.sinh((uniform + 1) / 2 * top)).astype(dtype), None
+        return cosines(uniform), None
     k = np.arange(NODES)
     x = np.cos(np.pi * (2 * k + 1) / (2 * NODES))
     # barycentric weights of Chebyshev points of the first kind (Berrut & Trefethen 2004, eq. 5.3)
     weight = (-1.0) ** k * np.sin(np.pi * (2 * k + 1) / (2 * NODES))
     matrix = weight / (uniform[:, None] - x)  # x is irrational: no angle of the table is a node
     matrix /= matrix.sum(1, keepdims=True)
-    return np.sin(end + width * np.sinh((x + 1) / 2 * top)).astype(dtype), matrix.astype(dtype)
+    return cosines(x), matrix.astype(dtype)
 
 
 class PolarTables:
@@ -89,16 +95,17 @@ class PolarStencil(eqx.Module):
     def of(cosine: np.ndarray, max_angle: float) -> PolarStencil:
         """Stencil of angles given by their cosines, all within [0, max_angle]."""
         # Guard: the cosine of a vector normalised to rounding may be above 1 (tests/test_polar.py::test_beyond_one).
-        return PolarStencil(*_positions(np.arcsin(np.clip(cosine, -1, 1)), max_angle, False, np), max_angle)
+        cosine = np.clip(cosine, 0, 1)
+        return PolarStencil(*_positions(cosine, np.sqrt((1 - cosine) * (1 + cosine)), max_angle, False, np), max_angle)
 
     @staticmethod
     def to_horizon(cosine: Array, sine: Array) -> PolarStencil:
         """Stencil on the fine table up to the horizon of angles given by both, within a program.
 
-        From the sine, too: at normal incidence the slope of an arcsine is infinite.
+        From the sine, too: made of the cosine, its slope is infinite at normal incidence.
         """
         limit = float(np.pi / 2)
-        return PolarStencil(*_positions(jnp.arctan2(cosine, sine), limit, True, jnp), limit, True)
+        return PolarStencil(*_positions(cosine, sine, limit, True, jnp), limit, True)
 
     @staticmethod
     def cosines(max_angle: float) -> np.ndarray:
@@ -120,10 +127,11 @@ class PolarStencil(eqx.Module):
         return sum(w * nodes[self.index + (k - 1)] for k, w in enumerate(weights))  # type: ignore[return-value]
 
 
-def _positions(distance: Any, max_angle: float, fine: bool, xp: Any) -> tuple[Any, Any]:
-    """Index and fraction on the table of angles given by their distance to the horizon, with NumPy or its like in JAX."""
+def _positions(cosine: Any, sine: Any, max_angle: float, fine: bool, xp: Any) -> tuple[Any, Any]:
+    """Index and fraction on the table of angles given by cosine and sine, with NumPy or its like in JAX."""
     end, width, top = _distances(max_angle, fine)
-    position = xp.arcsinh(xp.maximum(distance - end, 0) / width) * (INTERVALS[fine] / top)
+    y = xp.maximum(cosine / (1 + sine) - end, 0) / width
+    position = xp.log(y + xp.sqrt(1 + y * y)) * (INTERVALS[fine] / top)  # arsinh: y is not negative
     # the stencil's four points are index-1 .. index+2, so the first and last interval lean inwards
     index = xp.clip(position.astype(xp.int32), 1, INTERVALS[fine] - 2)
     return index, position - index
