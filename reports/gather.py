@@ -263,6 +263,7 @@ def _cells(
 ) -> tuple[Reals, Reals, Reals, NDArray[np.bool_], NDArray[np.intp], Reals, Reals, str]:
     """A sample of the table's cells: directions, values ``[n, C]``, which are fitted, bin, edges in degrees, in words."""
     grid = table.layout
+    kept = table.within(np.radians(max_angle))
     if isinstance(grid, HalfDifferenceGrid):
         h, d, p = grid.shape[-3:]
         step_h, step_d, step_p = max(1, h // 90), max(1, d // 45), max(1, p // 12)
@@ -276,26 +277,24 @@ def _cells(
         wi, wo = directions(th[:, None, None], td[:, None], pd, ph[:, None, None, None])
         wi, wo = wi.reshape(-1, 3), wo.reshape(-1, 3)
         values = table.planes[(slice(None), *index)].reshape(table.channels, -1).T
-        mask = table.mask[index].ravel()
+        used = kept[index].ravel()
         cell = np.arange(len(th) * len(td)).reshape(len(th), len(td), 1)
         which = np.broadcast_to(cell, (len(ph), len(th), len(td), len(pd))).ravel()
         edges_h = np.append(grid.theta_h_edges[:-1][sub[0]], grid.theta_h_edges[-1])
         edges_d = np.append(grid.theta_d_edges[:-1][sub[1]], grid.theta_d_edges[-1])
         part = f"{len(th)} \u00d7 {len(td)} \u00d7 {len(pd)} of {h} \u00d7 {d} \u00d7 {p} cells"
-        how = f"From {part} (theta_h \u00d7 theta_d \u00d7 phi_d), as far as both polar angles are at most {max_angle:g}°."
+        how = f"From {part} (theta_h \u00d7 theta_d \u00d7 phi_d), as far as both polar angles are below {max_angle:g}°."
     else:
         all_i, all_o = grid.directions()
         step = max(1, int(np.prod(grid.shape)) // 50_000)
         wi, wo = all_i.reshape(-1, 3)[::step], all_o.reshape(-1, 3)[::step]
         values = table.planes.reshape(table.channels, -1)[:, ::step].T
-        mask = table.mask.ravel()[::step]
+        used = kept.ravel()[::step]
         edges_h, edges_d = np.radians(90) * np.linspace(0, 1, 31) ** 2, np.radians(np.linspace(0, 90, 31))
         a_h, a_d, _, _ = half_difference(wi, wo)
         bins = [np.clip(np.searchsorted(e, a, side="right") - 1, 0, 29) for e, a in ((edges_h, a_h), (edges_d, a_d))]
         which = bins[0] * 30 + bins[1]
-        how = f"{len(wi)} samples in bins of theta_h and theta_d, as far as both polar angles are at most {max_angle:g}°."
-    limit = np.cos(np.radians(max_angle)) - 1e-12
-    used = mask & (wi[:, 2] >= limit) & (wo[:, 2] >= limit)
+        how = f"{len(wi)} samples in bins of theta_h and theta_d, as far as both polar angles are below {max_angle:g}°."
     return wi, wo, values, used, which, np.degrees(edges_h), np.degrees(edges_d), how
 
 

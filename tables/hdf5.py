@@ -79,8 +79,12 @@ def read_truth(path: StrPath) -> dict[str, Any] | None:
 def write_hdf5(path: StrPath, values: Table, *, truth: Mapping[str, Any] | None = None) -> None:
     """Write a table, with the true parameters of a synthetic one as ``truth`` if they are known (numbers, text, arrays).
 
-    Raises InputError if the file cannot be written; nothing is left behind.
+    Raises InputError if the file cannot be written and for a table weighted by a scene; nothing is left behind.
     """
+    if type(values.layout) not in _KINDS.values():
+        raise InputError(
+            f"{path}: the format keeps no weights of a scene; save the table itself, and weight it when read"
+        )
     with replacing(path) as temporary:
         temporary.write_bytes(_image(values, truth))
 
@@ -97,7 +101,7 @@ def _image(values: Table, truth: Mapping[str, Any] | None) -> bytes:
         file.create_dataset("values", data=values.planes).attrs["units"] = "1/sr"
         file.create_dataset("mask", data=values.mask)
         group = file.create_group("layout")
-        group.attrs["kind"] = next(kind for kind, cls in _KINDS.items() if isinstance(values.layout, cls))
+        group.attrs["kind"] = next(kind for kind, cls in _KINDS.items() if type(values.layout) is cls)
         for f in fields(values.layout):
             data = getattr(values.layout, f.name)
             if data is not None:

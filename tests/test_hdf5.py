@@ -6,6 +6,7 @@ from dataclasses import fields, replace
 import brdfit
 import numpy as np
 import pytest
+from brdfit.scenes.appearance import SceneGrid
 from brdfit.tables import HalfDifferenceGrid, Scattered, SphericalGrid, merl_grid, read_hdf5, read_truth, table, write_hdf5
 
 RNG = np.random.default_rng(1)
@@ -75,6 +76,15 @@ def test_round_trip(tmp_path, layout, channels):
         else:
             assert a == b
             assert type(a) is type(b)
+
+
+def test_weights_of_a_scene_are_not_lost(tmp_path):
+    grid = LAYOUTS["merl"]
+    axes = {f.name: getattr(grid, f.name) for f in fields(HalfDifferenceGrid)}
+    given = table(np.ones((3, *grid.shape)), SceneGrid(**axes, weight=np.ones(grid.shape)), "blue")
+    with pytest.raises(brdfit.InputError, match=r"t\.h5: the format keeps no weights of a scene; save the table itself, and weight it"):
+        write_hdf5(tmp_path / "t.h5", given)
+    assert not list(tmp_path.iterdir())
 
 
 def test_same_table_same_bytes(tmp_path):

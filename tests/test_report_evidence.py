@@ -6,10 +6,10 @@ import brdfit
 import numpy as np
 from brdfit.data import source
 from brdfit.reports.evidence import load_evidence, save_evidence
-from brdfit.reports.gather import gather, interpolate
+from brdfit.reports.gather import _cells, gather, interpolate
 from brdfit.reports.published_fits import published
 from brdfit.reports.write import write_report
-from brdfit.tables import Scattered, SphericalGrid, table
+from brdfit.tables import Scattered, SphericalGrid, merl_grid, table
 
 from .report_cases import GGX, WARD, Reader, fit_of, table_of
 
@@ -49,6 +49,14 @@ def test_residual_of_the_truth_vanishes(evidence, measured):
     assert np.nanmax(np.abs(evidence.maps.rms[1])) < 1e-12  # gtr made the table
     assert np.nanmax(evidence.maps.rms[0]) > 0.05  # ward did not
     assert np.isnan(evidence.maps.signed[2]).all()  # sgd failed
+
+
+def test_maps_show_the_cells_that_are_fitted():
+    grid = merl_grid()
+    zero = table(np.zeros((1, *grid.shape)), grid, "black")
+    used = _cells(zero, 80.0)[3]
+    # of cells at the limit itself, a row of this grid, rounding would let some in
+    assert used.sum() == zero.within(np.radians(80.0))[:, ::2, ::15].sum()
 
 
 def test_interpolation_is_exact_at_the_cells_and_never_reads_a_masked_one(measured):
