@@ -46,10 +46,14 @@ CLOSE = 1.1
 CHEAPER, BEARABLE = 0.7, 3.0
 """A model that costs less than this share of the best one's time is named, if its error is below this multiple."""
 REPEATS = 30
+LISTED = 40
+"""Fits that did not converge are listed up to so many."""
+LETTER, LINE = 4.0, 10.0
+"""Width and height of a letter of a label, in points."""
 COSTLY = 3
 """Models that are fitted last and may be missing for some materials."""
 SAME_AS = {"low_microfacet": "abc"}
-"""Models whose lobes are those of another, which is recommended in their place."""
+"""Models whose lobes are those of another, which stands for both where one model is named."""
 
 RANKS = """\
 By loss and for all three: the error over the smallest of any model on the same material, geometric mean over the
@@ -77,7 +81,8 @@ class Comparison:
         self.errors = np.array(
             [[[at.get((m, t, e), np.nan) for e in LOSSES] for t in self.materials] for m in self.models], float
         )
-        self.ratio = self.errors / np.nanmin(self.errors, 0)
+        self.own = [i for i, m in enumerate(self.models) if m not in SAME_AS]
+        self.ratio = self.errors / np.nanmin(self.errors[self.own], 0)
         overall = {m: self.typical(m) for m in self.models}
         self.ranked = sorted(self.models, key=lambda m: overall[m])
 
@@ -146,12 +151,31 @@ def ranking(c: Comparison) -> list[str]:
     return lines
 
 
+def able(c: Comparison, kind: str) -> list[str]:
+    """Models that were fitted to all materials of a kind, by their error under the first loss."""
+    known = [m for m in c.models if m not in SAME_AS and np.isfinite(c.over_best(m, None, kind)).all()]
+    return sorted(known, key=lambda m: c.typical(m, LOSSES[0], kind))
+
+
+def summary(c: Comparison) -> str:
+    """The best model of each kind in one sentence; that of several kinds stands for all of them that it is close on."""
+    best = {kind: able(c, kind)[0] for kind in KINDS if any(KIND.get(m) == kind for m in c.materials)}
+    usual, _ = Counter(best.values()).most_common(1)[0]
+    lead = {kind: c.typical(usual, LOSSES[0], kind) / c.typical(m, LOSSES[0], kind) for kind, m in best.items()}
+    first = [kind for kind, m in best.items() if m == usual]
+    close = [kind for kind, m in best.items() if m != usual and lead[kind] <= CLOSE]
+    words = f"In short, judged under `{LOSSES[0]}`: `{usual}` for {', '.join(first)}"
+    words += f", and within {CLOSE - 1:.0%} of the best for {', '.join(close)}" if close else ""
+    rest = [kind for kind in best if kind not in first and kind not in close]
+    others = [f"`{best[kind]}` for {kind} (`{usual}` {lead[kind]:.2f} times its error)" for kind in rest]
+    return "; ".join([words, *others]) + "."
+
+
 def advice(c: Comparison, kind: str) -> list[str]:
     """Which model to use for a kind of material, in words."""
     loss = LOSSES[0]
     members = [m for m in c.materials if KIND.get(m) == kind]
-    able = [m for m in c.models if m not in SAME_AS and np.isfinite(c.over_best(m, None, kind)).all()]
-    by_error = sorted(able, key=lambda m: c.typical(m, loss, kind))
+    by_error = able(c, kind)
     best, *others = by_error
     lead = c.typical(best, loss, kind)
     close = [m for m in others if c.typical(m, loss, kind) <= CLOSE * lead]
@@ -174,7 +198,7 @@ def advice(c: Comparison, kind: str) -> list[str]:
             f"least: {c.typical(m, loss, kind):.2f}."
         )
     for other in LOSSES[1:]:
-        m = min(able, key=lambda m: c.typical(m, other, kind))
+        m = min(by_error, key=lambda m: c.typical(m, other, kind))
         value, its = c.typical(m, other, kind), c.typical(best, other, kind)
         leads = f"leads too ({value:.2f})" if m == best else f"leads ({value:.2f}; `{best}` {its:.2f})"
         words.append(f"Fitted and judged under `{other}`, `{m}` {leads}.")
@@ -201,7 +225,7 @@ def heat_map(c: Comparison, path: Path) -> None:
                 ax.text((a + b - 1) / 2, -0.9, name, ha="center", va="bottom", fontsize=7, color="#444444")
             ax.set_xticks(range(len(c.materials)), c.materials, rotation=90, fontsize=6.5)
             ax.tick_params(length=0)
-            best = np.argwhere(values <= 0)
+            best = np.argwhere((values <= 0) & np.isin(rows, c.own)[:, None])
             ax.plot(best[:, 1], best[:, 0], "o", ms=2.2, color="#D55E00", lw=0)
         axes[0, 0].set_yticks(range(len(rows)), c.ranked, fontsize=8)
         box = axes[0, -1].get_position()
@@ -220,7 +244,8 @@ def pareto(c: Comparison, path: Path) -> None:
         figure.subplots_adjust(wspace=0.18, hspace=0.24)
         axes[1, 3].axis("off")
         for ax, kind in zip(axes.ravel(), kinds, strict=False):
-            points = [(c.cost[m], c.typical(m, LOSSES[0], kind)) for m in c.models]
+            models = [m for m in c.models if m not in SAME_AS]
+            points = [(c.cost[m], c.typical(m, LOSSES[0], kind)) for m in models]
             if not np.isfinite(points).any():
                 continue
             best = front(points)
@@ -231,13 +256,15 @@ def pareto(c: Comparison, path: Path) -> None:
             ax.set_ylim(0.8, np.nanmax(y) * 1.15)
             ax.plot(x, y, "o", ms=4, mfc="white", mec="#8a8a8a", lw=0)
             ax.plot(x[best], y[best], "o-", ms=5, color="#0072B2", lw=0.9, drawstyle="steps-post")
-            height = np.inf
-            for i in best:
-                at = ax.transData.transform(points[i])[1] * 72 / figure.dpi
-                drop = min(-6.0, height - 10.5 - at)
-                height = at + drop
+            placed: list[tuple[float, float]] = []
+            for i in best:  # to the left of each point and below it no point lies; but labels may
+                right, height = ax.transData.transform(points[i]) * 72 / figure.dpi
+                left, drop = right - 5 - LETTER * len(models[i]), -6.0
+                while any(left < r and abs(height + drop - h) < LINE for r, h in placed):
+                    drop -= 1
+                placed.append((right, height + drop))
                 ax.annotate(
-                    c.models[i], points[i], (-5, drop), textcoords="offset points", ha="right", va="center", fontsize=7
+                    models[i], points[i], (-5, drop), textcoords="offset points", ha="right", va="center", fontsize=7
                 )
             ax.set_title("all materials" if kind is None else kind)
             ticks = [t for t in (1, 1.5, 2, 3, 5, 10, 20, 50) if t < np.nanmax(y) * 1.15]
@@ -268,7 +295,7 @@ def winners(c: Comparison) -> list[str]:
     for i, t in enumerate(c.materials):
         cells = []
         for k in range(len(LOSSES)):
-            j = int(np.nanargmin(c.errors[:, i, k]))
+            j = c.own[int(np.nanargmin(c.errors[c.own, i, k]))]
             cells.append(f"`{c.models[j]}` {c.errors[j, i, k]:.5f}")
         lines.append(f"| {t} | {KIND.get(t, '')} | " + " | ".join(cells) + " |")
     return lines
@@ -312,7 +339,7 @@ def write(out: Path, rows: list[Row], materials: list[str], first: brdfit.Table,
     heat_map(c, base.with_name(base.name + "_errors.png"))
     pareto(c, base.with_name(base.name + "_cost.png"))
     table(rows, out.with_suffix(".csv"))
-    failed = [r for r in rows if not r["converged"]]
+    failed = sorted((r for r in rows if not r["converged"]), key=lambda r: (c.ranked.index(r["model"]), r["material"]))
     lines = [
         "# Which model for which material",
         "",
@@ -332,6 +359,7 @@ def write(out: Path, rows: list[Row], materials: list[str], first: brdfit.Table,
         "error over the smallest of any model on the same material.",
         "",
     ]
+    lines += [summary(c), ""]
     for kind in KINDS:
         if any(KIND.get(m) == kind for m in c.materials):
             lines += advice(c, kind)
@@ -360,9 +388,11 @@ def write(out: Path, rows: list[Row], materials: list[str], first: brdfit.Table,
         lines += [
             "## Fits that did not converge",
             "",
-            f"{len(failed)} of {len(rows)}: "
-            + "; ".join(f"{r['model']}, {r['material']}, {r['loss']}: {r['reason']}" for r in failed[:40])
-            + ("." if len(failed) <= 40 else f"; and {len(failed) - 40} more, in the CSV file."),
+            f"{len(failed)} of {len(rows)}:"
+            if len(failed) <= LISTED
+            else f"{LISTED} of {len(failed)}; all are in the CSV file:",
+            "",
+            *(f"- `{r['model']}`, {r['material']}, `{r['loss']}`: {r['reason']}" for r in failed[:LISTED]),
             "",
         ]
     out.write_text("\n".join(lines), encoding="utf-8")
