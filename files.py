@@ -1,4 +1,4 @@
-"""Opening files with their faults in words, and replacing them whole."""
+"""Opening files with their faults in words, replacing them whole, and values as JSON has them."""
 
 from __future__ import annotations
 
@@ -8,6 +8,9 @@ from collections.abc import Iterator
 from contextlib import contextmanager
 from io import BufferedReader
 from pathlib import Path
+from typing import Any
+
+import numpy as np
 
 from .errors import InputError
 
@@ -55,4 +58,17 @@ def replacing(path: StrPath) -> Iterator[Path]:
         temporary.unlink(missing_ok=True)
 
 
-__all__ = ["StrPath", "reading", "replacing"]
+def plain(value: Any) -> Any:
+    """JSON values of arrays and dicts of them; numbers that JSON does not have become None."""
+    if isinstance(value, dict):
+        return {k: plain(v) for k, v in value.items()}
+    if isinstance(value, (list, tuple)):
+        return [plain(v) for v in value]
+    if isinstance(value, np.ndarray):
+        return plain(value.tolist())
+    if isinstance(value, (float, np.floating)):
+        return float(value) if np.isfinite(value) else None
+    return value
+
+
+__all__ = ["StrPath", "plain", "reading", "replacing"]

@@ -8,6 +8,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
+from ..files import plain
 from ..models import BRDF, build, parameters_of, variants
 from .effort import DEFAULT, Effort
 from .plan import Plan
@@ -115,28 +116,28 @@ class Fit:
             "loss": self.loss,
             "measure": self.measure,
             "max_angle": self.max_angle,
-            "parameters": _plain(self.parameters),
-            "stderr": _plain(self.stderr),
-            "spread": _plain(self.spread),
-            "covariance": {a: _plain(row) for a, row in self.covariance.items()},
+            "parameters": plain(self.parameters),
+            "stderr": plain(self.stderr),
+            "spread": plain(self.spread),
+            "covariance": {a: plain(row) for a, row in self.covariance.items()},
             "fixed": list(self.fixed),
             "at_bound": list(self.at_bound),
             "undetermined": list(self.undetermined),
             "labels": list(self.labels),
-            "correlation": _plain(self.correlation),
+            "correlation": plain(self.correlation),
             "converged": self.converged,
             "reason": self.reason,
-            "errors": _plain(self.errors),
+            "errors": plain(self.errors),
             "cells": dict(self.cells),
             "seconds": {k: round(v, 6) for k, v in self.seconds.items()},
             "starts": self.starts,
-            "optima": [{"error": _plain(o.error), "starts": o.starts} for o in self.optima],
+            "optima": [{"error": plain(o.error), "starts": o.starts} for o in self.optima],
             "passes": self.passes,
             "path": self.path,
-            "shift": _plain(self.shift),
-            "gain": _plain(self.gain),
+            "shift": plain(self.shift),
+            "gain": plain(self.gain),
             "effort": asdict(self.effort),
-            "plan": None if self.plan is None else _plain(asdict(self.plan)),
+            "plan": None if self.plan is None else plain(asdict(self.plan)),
         }
 
 
@@ -182,19 +183,6 @@ def from_record(record: dict[str, Any]) -> Fit:
         effort=Effort(**record.get("effort", {})),
         plan=None if record.get("plan") is None else Plan(**record["plan"]),
     )
-
-
-def _plain(value: Any) -> Any:
-    """JSON values of arrays and dicts of them; numbers that JSON does not have become None."""
-    if isinstance(value, dict):
-        return {k: _plain(v) for k, v in value.items()}
-    if isinstance(value, (list, tuple)):
-        return [_plain(v) for v in value]
-    if isinstance(value, np.ndarray):
-        return _plain(value.tolist())
-    if isinstance(value, (float, np.floating)):
-        return float(value) if np.isfinite(value) else None
-    return value
 
 
 def _array(value: Any) -> Reals:

@@ -1,4 +1,4 @@
-"""A page and its numbers, side by side in a directory: what the commands beside ``fit`` write."""
+"""Pages from templates, and a page and its numbers side by side: what the commands beside ``fit`` write."""
 
 from __future__ import annotations
 
@@ -9,6 +9,20 @@ from typing import Any
 from ..files import StrPath, replacing
 
 
+def rendered(template: Path, context: dict[str, Any]) -> str:
+    """The text of a Jinja ``template``, which may use those of reports; in HTML, values are escaped."""
+    from jinja2 import Environment, FileSystemLoader, StrictUndefined, select_autoescape
+
+    templates = Environment(
+        loader=FileSystemLoader([template.parent, Path(__file__).parent]),
+        autoescape=select_autoescape(["html.j2"]),
+        undefined=StrictUndefined,
+        trim_blocks=True,
+        lstrip_blocks=True,
+    )
+    return templates.get_template(template.name).render(context)
+
+
 def write_beside(
     out_dir: StrPath, template: Path, context: dict[str, Any], names: tuple[str, str], numbers: dict[str, Any]
 ) -> Path:
@@ -17,16 +31,7 @@ def write_beside(
     ``names`` are those of page and numbers in ``out_dir``. Returns the path of the page.
     Raises InputError if a file cannot be written.
     """
-    from jinja2 import Environment, FileSystemLoader, StrictUndefined
-
-    templates = Environment(
-        loader=FileSystemLoader([template.parent, Path(__file__).parent]),
-        autoescape=True,
-        undefined=StrictUndefined,
-        trim_blocks=True,
-        lstrip_blocks=True,
-    )
-    html = templates.get_template(template.name).render(context)
+    html = rendered(template, context)
     text = json.dumps(numbers, indent=1, ensure_ascii=False, allow_nan=False) + "\n"
     out = Path(out_dir)
     for name, content in ((names[1], text), (names[0], html)):
@@ -35,4 +40,4 @@ def write_beside(
     return out / names[0]
 
 
-__all__ = ["write_beside"]
+__all__ = ["rendered", "write_beside"]

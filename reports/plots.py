@@ -123,6 +123,31 @@ def as_svg(figure: Any, alt: str) -> str:
     return head + f"<title>{alt}</title>" + text[text.index(">") + 1 :].strip()
 
 
+def log_ticks(ax: Any) -> None:
+    """Plain numbers at more than the powers of ten where logarithmic axes are short."""
+    from matplotlib.ticker import FuncFormatter, LogLocator, NullFormatter
+
+    for axis, (low, high) in ((ax.xaxis, ax.get_xlim()), (ax.yaxis, ax.get_ylim())):
+        if axis.get_scale() == "log" and (decades := np.log10(high / low)) < 2.5:
+            axis.set_major_locator(LogLocator(subs=(1, 2, 5) if decades > 0.8 else tuple(range(1, 10))))
+            axis.set_major_formatter(FuncFormatter(lambda v, _: f"{v:g}"))
+            axis.set_minor_formatter(NullFormatter())
+
+
+def png_uri(picture: NDArray[np.uint8]) -> str:
+    """The data URI of a picture ``[height, width, 3]`` as PNG."""
+    from PIL import Image
+
+    out = io.BytesIO()
+    Image.fromarray(picture).save(out, "PNG", optimize=True)
+    return data_uri(out.getvalue())
+
+
+def data_uri(png: bytes) -> str:
+    """The data URI of a PNG."""
+    return "data:image/png;base64," + base64.b64encode(png).decode()
+
+
 def lobes(part: Lobes, fits: Sequence[tuple[int, str]], alt: str, salt: str) -> str:
     """Luminance in the plane of incidence: all on a log scale, the peak on a linear one. ``fits``: (row, label)."""
     from matplotlib.ticker import NullLocator
@@ -252,7 +277,7 @@ def maps(part: Maps, fits: Sequence[tuple[int, str]]) -> str:
             ax.set_ylabel("θ$_h$, degrees")
         out = io.BytesIO()
         figure.savefig(out, format="png", dpi=150, metadata={"Software": None})
-    return _uri(_quantised(out.getvalue()))
+    return data_uri(_quantised(out.getvalue()))
 
 
 def _quantised(png: bytes) -> bytes:
@@ -285,7 +310,7 @@ def scale(top: float) -> str:
     from matplotlib import colormaps
 
     row = colormaps["inferno"](np.linspace(0, 1, 128))[None, :, :3].repeat(8, 0)
-    return _uri(_png(np.round(255 * row).astype(np.uint8)))
+    return png_uri(np.round(255 * row).astype(np.uint8))
 
 
 def _image(part: Sphere, code: NDArray[Any], known: NDArray[Any]) -> str:
@@ -295,19 +320,7 @@ def _image(part: Sphere, code: NDArray[Any], known: NDArray[Any]) -> str:
     y, x = np.nonzero(part.lit == 1)
     stripes = np.where(((x + y) // 3 % 2)[:, None], 150, 185)
     picture[y, x] = np.where(known[:, None], np.round(255 * code), stripes).astype(np.uint8)
-    return _uri(_png(picture))
-
-
-def _png(picture: NDArray[np.uint8]) -> bytes:
-    from PIL import Image
-
-    out = io.BytesIO()
-    Image.fromarray(picture).save(out, "PNG", optimize=True)
-    return out.getvalue()
-
-
-def _uri(png: bytes) -> str:
-    return "data:image/png;base64," + base64.b64encode(png).decode()
+    return png_uri(picture)
 
 
 def albedo(part: Albedo, fits: Sequence[tuple[int, str]], max_angle: float, alt: str, salt: str) -> str:
@@ -362,12 +375,7 @@ def tradeoff(points: Sequence[tuple[str, float, float]], limit: float, alt: str,
         ax.set_xlim(times.min() / 4, times.max() * 3.2)
         ax.set_ylim(min(errors.min(), limit) / 1.5, max(errors.max(), limit) * 1.6)
         ax.axhline(limit, color="#555555", lw=0.8, ls=(0, (2, 2)))
-        from matplotlib.ticker import FuncFormatter, LogLocator, NullFormatter
-
-        for axis in (ax.xaxis, ax.yaxis):
-            axis.set_major_locator(LogLocator(subs=(1, 2, 5)))
-            axis.set_major_formatter(FuncFormatter(lambda v, _: f"{v:g}"))
-            axis.set_minor_formatter(NullFormatter())
+        log_ticks(ax)
         ax.set_xlabel("solve, seconds")
         ax.set_ylabel("perceptual error")
         return as_svg(figure, alt)

@@ -10,6 +10,7 @@ from weakref import WeakKeyDictionary
 
 from ..errors import InputError
 from ..files import StrPath, reading, replacing
+from .beside import rendered
 from .evidence import Evidence, load_evidence
 from .page import page
 
@@ -79,16 +80,7 @@ def read_fits(out_dir: StrPath) -> tuple[list[Fit], dict[str, Any]]:
 
 def write_report(out_dir: StrPath, fits: Sequence[Fit], evidence: Sequence[Evidence], environment: dict[str, Any]) -> Path:
     """Write DIR/report.html: one file that needs no other and no network. The same input gives the same bytes."""
-    from jinja2 import Environment, FileSystemLoader, StrictUndefined
-
-    templates = Environment(
-        loader=FileSystemLoader(Path(__file__).parent),
-        autoescape=True,
-        undefined=StrictUndefined,
-        trim_blocks=True,
-        lstrip_blocks=True,
-    )
-    html = templates.get_template("page.html.j2").render(page(fits, evidence, environment))
+    html = rendered(Path(__file__).parent / "page.html.j2", page(fits, evidence, environment))
     return _write(Path(out_dir) / REPORT, html)
 
 

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import base64
 import io
 import json
 from collections.abc import Callable, Sequence
@@ -11,9 +10,12 @@ from pathlib import Path
 from typing import Any
 
 import numpy as np
+from numpy.typing import NDArray
 
 from ..environment import environment
 from ..files import StrPath, replacing
+from ..reports.beside import rendered
+from ..reports.plots import data_uri
 from .atlas import Map, Record, Worst, survey
 from .measure import HELD, LARGEST_SLOPE, SMALLEST_SINGLE
 
@@ -31,8 +33,6 @@ DIGITS = {"float64": 16, "float32": 8}
 
 def write_atlas(out_dir: StrPath, draws: int | None = None, say: Callable[[str], None] = lambda text: None) -> Path:
     """Measure everything and write DIR/stability.md with its pictures, DIR/stability.html and DIR/stability.json."""
-    from jinja2 import Environment, FileSystemLoader, StrictUndefined
-
     records, where = survey(draws, say), environment()
     out = Path(out_dir)
     groups = []
@@ -43,11 +43,8 @@ def write_atlas(out_dir: StrPath, draws: int | None = None, say: Callable[[str],
         names = names if len(names) > 1 else [key]
         for name, picture in zip(names, pictures, strict=True):
             _write(out / "stability" / f"{name}.png", picture)
-        shown = [{"name": n, "embedded": base64.b64encode(p).decode()} for n, p in zip(names, pictures, strict=True)]
+        shown = [{"name": n, "embedded": data_uri(p)} for n, p in zip(names, pictures, strict=True)]
         groups.append({"title": title, "rows": [_row(r) for r in members], "pictures": shown})
-    templates = Environment(
-        loader=FileSystemLoader(Path(__file__).parent), undefined=StrictUndefined, trim_blocks=True, lstrip_blocks=True
-    )
     context = {
         "groups": groups,
         "where": where,
@@ -60,14 +57,14 @@ def write_atlas(out_dir: StrPath, draws: int | None = None, say: Callable[[str],
         "beyond": [_beyond(r) for r in records if r.beyond_share],
     }
     for name in ("stability.md", "stability.html"):
-        _write(out / name, templates.get_template(f"{name}.j2").render(context).encode())
+        _write(out / name, rendered(Path(__file__).parent / f"{name}.j2", context).encode())
     document = {
         "format": "brdfit-stability",
         "version": 1,
         "environment": where,
-        "records": [_plain(asdict(r)) for r in records],
+        "records": [asdict(r) for r in records],
     }
-    _write(out / "stability.json", (json.dumps(document, indent=1, allow_nan=False) + "\n").encode())
+    _write(out / "stability.json", (json.dumps(document, indent=1, allow_nan=False, default=_rounded) + "\n").encode())
     return out / "stability.html"
 
 
@@ -120,12 +117,9 @@ def _row(r: Record) -> dict[str, Any]:
     }
 
 
-def _plain(x: Any) -> Any:
-    if isinstance(x, np.ndarray):
-        return [float(f"{v:.6g}") for v in x] if x.ndim == 1 else [_plain(row) for row in x]
-    if isinstance(x, dict):
-        return {k: _plain(v) for k, v in x.items()}
-    return [_plain(v) for v in x] if isinstance(x, tuple | list) else x
+def _rounded(a: NDArray[np.float64]) -> list[Any]:
+    """Rows of an array, numbers of six digits."""
+    return [float(f"{v:.6g}") for v in a] if a.ndim == 1 else list(a)
 
 
 def _picture(records: Sequence[Record]) -> bytes:

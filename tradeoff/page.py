@@ -7,10 +7,8 @@ from dataclasses import asdict, replace
 from pathlib import Path
 from typing import Any
 
-import numpy as np
-
 from ..environment import environment
-from ..files import StrPath
+from ..files import StrPath, plain
 from ..reports.beside import write_beside
 from ..reports.words import NONE, significant, thousands
 from ..reports.words import seconds as duration
@@ -42,7 +40,7 @@ def document(result: Tradeoff, where: dict[str, Any]) -> dict[str, Any]:
     """All numbers as plain JSON values; where and when they were measured is in ``environment``. NaN becomes null."""
     table = result.table
     first = result.fits[0]
-    plain: dict[str, Any] = _plain(
+    found: dict[str, Any] = plain(
         {
             "format": "brdfit-tradeoff",
             "version": 1,
@@ -60,20 +58,10 @@ def document(result: Tradeoff, where: dict[str, Any]) -> dict[str, Any]:
             "fits": [f.record() for f in result.fits],
         }
     )
-    return plain
+    return found
 
 
 _MEASURED = ("settings", "renderings", "quadratures", "fresnel", "masking")
-
-
-def _plain(x: Any) -> Any:
-    if isinstance(x, dict):
-        return {k: _plain(v) for k, v in x.items()}
-    if isinstance(x, list | tuple):
-        return [_plain(v) for v in x]
-    if isinstance(x, float | np.floating):
-        return float(x) if np.isfinite(x) else None
-    return x
 
 
 def _context(result: Tradeoff, where: dict[str, Any]) -> dict[str, Any]:

@@ -8,7 +8,7 @@ from typing import Any
 
 import numpy as np
 
-from ..reports.plots import MARKERS, OTHERS, PALETTE, as_svg, new_figure, styled
+from ..reports.plots import MARKERS, OTHERS, PALETTE, as_svg, log_ticks, new_figure, styled
 from .pareto import front
 
 GAP = 11.0
@@ -95,7 +95,7 @@ def _draw(ax: Any, panel: Panel, look: dict[str, dict[str, Any]]) -> None:
             _label(ax, shown[i].label, (costs[i], errors[i]), (5, 4), "left")
     ax.set_xlabel(panel.cost)
     ax.set_ylabel(panel.error)
-    _ticks(ax)
+    log_ticks(ax)
 
 
 def _name(ax: Any, best: Sequence[tuple[str, float, float]]) -> None:
@@ -110,17 +110,6 @@ def _name(ax: Any, best: Sequence[tuple[str, float, float]]) -> None:
 
 def _label(ax: Any, text: str, at: tuple[float, float], shift: tuple[float, float], side: str) -> None:
     ax.annotate(text, at, xytext=shift, textcoords="offset points", ha=side, va="center", fontsize=7.5, color="#222222")
-
-
-def _ticks(ax: Any) -> None:
-    from matplotlib.ticker import FuncFormatter, LogLocator, NullFormatter
-
-    for axis, (low, high) in ((ax.xaxis, ax.get_xlim()), (ax.yaxis, ax.get_ylim())):
-        decades = np.log10(high / low)
-        if decades < 2.5:
-            axis.set_major_locator(LogLocator(subs=(1, 2, 5) if decades > 0.8 else tuple(range(1, 10))))
-            axis.set_major_formatter(FuncFormatter(lambda v, _: f"{v:g}"))
-            axis.set_minor_formatter(NullFormatter())
 
 
 __all__ = ["Panel", "Point", "pareto"]
