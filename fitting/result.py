@@ -16,6 +16,10 @@ from .plan import Plan
 Reals = NDArray[np.float64]
 Named = dict[str, Reals]
 
+CLEAR = 2.0
+"""How many times the other an error bar is that limits a parameter. A jackknife over B bands is itself known to about
+1/sqrt(2 (B - 1)), less where bands count unevenly, and where the model is right both bars estimate the same."""
+
 
 @dataclass(frozen=True)
 class Optimum:
@@ -98,12 +102,28 @@ class Fit:
         return sorted(pairs, key=lambda p: -abs(p[2]))
 
     def governing(self) -> dict[str, str]:
-        """For each parameter which uncertainty is the larger one: ``"stderr"`` (noise) or ``"spread"`` (misfit)."""
+        """For each parameter what limits it: noise (``"stderr"``), the form of the model (``"spread"``), or ``"both"``.
+
+        One of the two limits where it is at least :data:`CLEAR` times the other, by the largest of the channels.
+        """
         return {
-            n: "stderr" if np.nanmax(self.stderr[n], initial=0) > np.nanmax(self.spread[n], initial=0) else "spread"
+            n: _larger(np.nanmax(self.stderr[n], initial=0), np.nanmax(self.spread[n], initial=0))
             for n in self.parameters
             if n in self.stderr and n in self.spread
         }
+
+    def __repr__(self) -> str:
+        """What was fitted, how well, and what to look at: at most three lines."""
+        others = [f"{n} {e:.3g}" for n, e in self.errors.items() if n == "perceptual" != self.loss]
+        fitted = f"{self.loss} error {self.errors.get(self.loss, np.nan):.3g} (fitted)"
+        outcome = "converged" if self.converged else "not converged"
+        text = f"Fit({self.material} by {self.model_name}, {outcome}: {self.reason}"
+        if self.errors:
+            text += f"\n    {', '.join([fitted, *others])}"
+        if self.at_bound:
+            more = f" and {len(self.at_bound) - 1} more" if len(self.at_bound) > 1 else ""
+            text += f"\n    at a bound: {self.at_bound[0]}{more}"
+        return text + ")"
 
     def record(self) -> dict[str, Any]:
         """The fit as plain JSON values (the format of fits.json); NaN becomes null."""
@@ -183,6 +203,12 @@ def from_record(record: dict[str, Any]) -> Fit:
         effort=Effort(**record.get("effort", {})),
         plan=None if record.get("plan") is None else Plan(**record["plan"]),
     )
+
+
+def _larger(stderr: float, spread: float) -> str:
+    if spread > 0 and spread >= CLEAR * stderr:
+        return "spread"
+    return "stderr" if stderr > 0 and stderr >= CLEAR * spread else "both"
 
 
 def _array(value: Any) -> Reals:

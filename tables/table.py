@@ -33,6 +33,14 @@ class Table:
     seconds: float = 0.0
     """Time that reading it took."""
 
+    def __repr__(self) -> str:
+        """What it is and where it came from, without its values."""
+        shape = " x ".join(str(n) for n in self.layout.shape)
+        kind = f"{'isotropic' if self.isotropic else 'anisotropic'} {type(self.layout).__name__}"
+        masked = f"{100 * (1 - self.mask.mean()):.1f} % masked" if self.mask.size else "empty"
+        origin = f" from {self.source}" if self.source else ""
+        return f"Table({self.material}{origin}\n    {kind} {shape}, channels {self.channels}, {masked})"
+
     @property
     def channels(self) -> int:
         """Number of channels C."""

@@ -18,6 +18,8 @@ from brdfit.models.ward import Ward
 from brdfit.tables.table import table as make_table
 from jaxtyping import Array, Float
 
+from .report_cases import WARD, failed, fit_of, half_grid, table_of
+
 GRID = (30, 20, 24)
 NOISE = (Relative(0.02), Floor(0.0005))
 
@@ -60,6 +62,22 @@ def test_the_result():
         f = fit.model(np.array([0.6, 0, 0.8]), np.array([-0.6, 0, 0.8]))
     assert f.shape == (3,)
     assert f.dtype == np.float64
+
+
+def test_a_fit_and_a_table_print_short():
+    fit = fit_of("ward", WARD, 0.02, at_bound=("diffuse[0] = 0 (lower)", "alpha = 30 (upper)"))
+    assert repr(fit).splitlines() == [
+        "Fit(stuff by ward, converged: at a minimum",
+        "    log error 0.01 (fitted), perceptual 0.02",
+        "    at a bound: diffuse[0] = 0 (lower) and 1 more)",
+    ]
+    assert repr(failed()) == "Fit(stuff by sgd, not converged: every start ended at infinite cost)"
+    table = table_of(fit.model, half_grid(6, 5, 4))
+    masked = 100 * (1 - table.mask.mean())
+    assert repr(table).splitlines() == [
+        "Table(stuff from stuff.binary",
+        f"    isotropic HalfDifferenceGrid 6 x 5 x 4, channels 3, {masked:.1f} % masked)",
+    ]
 
 
 def test_parameters_held_fixed():
@@ -208,6 +226,8 @@ def test_a_second_table_of_the_same_shape_compiles_nothing():
     brdfit.fit(second, "ward", start={"alpha": 0.2})  # one more start, the same programs
     assert traced(lambda: brdfit.fit(third, "ward")) == 0
     assert traced(lambda: brdfit.fit(noisy(name="ward-13", seed=4)[0], "ward")) == 0
+    assert brdfit.fit(first, "ward", bounds={"alpha": (0.2, 0.9)}).parameters["alpha"] >= 0.2
+    assert traced(lambda: brdfit.fit(second, "ward", bounds={"alpha": (0.1, 0.8), "specular": (0, 1)})) == 0
 
 
 def test_configuration_stays_as_it_was():
@@ -222,6 +242,12 @@ def test_configuration_stays_as_it_was():
     # and the model that came back works in the precision it is called in
     f = jax.jit(lambda m, a, b: m(a, b))(fit.model, jnp.array([0.6, 0, 0.8]), jnp.array([0.0, 0, 1]))
     assert f.dtype == jnp.float32
+
+
+def test_preparing_is_told_by_every_fit_that_shares_it():
+    table, _ = noisy(seed=9)
+    fits = list(brdfit.fit_many(table, ("ward", "lambert")))
+    assert fits[0].seconds["prepare"] == fits[1].seconds["prepare"] > 1e-4, "reading 1e5 values takes longer than that"
 
 
 class Cosine(BRDF):
@@ -258,6 +284,21 @@ def test_what_is_no_model():
     table, _ = generate("ward-06", grid=(4, 4, 4))
     with pytest.raises(TypeError, match="a model is a name"):
         brdfit.fit(table, Broken())
+    with pytest.raises(TypeError, match="evaluate takes a model"):
+        brdfit.evaluate(table, "ward")
+
+
+def test_what_is_no_table():
+    for call in (lambda t: brdfit.fit(t, "ward"), lambda t: brdfit.evaluate(t, brdfit.model("lambert", diffuse=0.5))):
+        with pytest.raises(TypeError, match=r"a table is what brdfit.load .* not 'nickel.binary'"):
+            call("nickel.binary")
+
+
+def test_scattered_samples_of_which_none_is_above_the_horizon():
+    down = np.tile([0.0, 0.6, -0.8], (5, 1))
+    fit = brdfit.fit(brdfit.measurements(down, down, np.ones((5, 2))), "ward")
+    assert not fit.converged
+    assert "nothing to fit" in fit.reason
 
 
 # --- many ---------------------------------------------------------------------------------------------------------

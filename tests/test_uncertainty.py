@@ -14,6 +14,8 @@ from brdfit.data.synthetic import Floor, Grazing, Relative, generate
 from brdfit.fitting.samples import samples
 from brdfit.fitting.uncertainty import uncertainty
 
+from .report_cases import WARD, fit_of
+
 GRID = (30, 20, 24)
 DRAWS = 200
 
@@ -121,6 +123,19 @@ def test_spread_sees_misfit(misfit):
     assert set(fit.governing().values()) == {"spread"}
 
 
+@pytest.mark.parametrize(
+    ("stderr", "spread", "limits"),
+    [
+        *((1.0, 1.5, "both"), (1.5, 1.0, "both"), (1.0, 2.0, "spread"), (2.0, 1.0, "stderr"), (0.0, 1.0, "spread")),
+        *((np.nan, 1.0, "spread"), (np.nan, np.nan, "both"), (0.0, 0.0, "both")),
+    ],
+)
+def test_what_limits_a_parameter_is_clear_of_the_other(stderr, spread, limits):
+    fit = fit_of("ward", WARD, 0.1)
+    fit.stderr["alpha"], fit.spread["alpha"] = np.asarray(stderr), np.asarray(spread)
+    assert fit.governing()["alpha"] == limits
+
+
 def test_spread_is_stderr_where_the_model_is_right():
     """With a right model and noise both estimate the same thing: equal on average over tables, up to a third."""
     ratios = []
@@ -128,6 +143,7 @@ def test_spread_is_stderr_where_the_model_is_right():
         table, _ = generate("ward-06", grid=GRID, noise=[Relative(0.01), Grazing(0.0025), Floor(0.0002)], seed=seed)
         fit = brdfit.fit(table, "ward")
         ratios.append(np.concatenate([(fit.spread[n] / fit.stderr[n]).reshape(-1) for n in fit.parameters]))
+        assert "spread" not in fit.governing().values(), "the form of this model limits nothing"
     mean = np.sqrt(np.mean(np.square(ratios), 0))
     assert ((mean > 0.67) & (mean < 1.5)).all(), mean
 
