@@ -18,15 +18,15 @@ from ..fitting.starts import Summary, starts
 from ..models import BRDF, build, parameter_values, parameters_of
 from ..models.effects import EFFECTS, SWITCH, SWITCHED, compose, in_order, switchable
 from ..models.effects.effect import Values
-from .linear import Linear
-from .pairs import Shown
+from .fitted_pixels import Shown
+from .linear import Linear, factor
 from .scene import Reals
 
 STEPS = 30
 RTOL = 1e-5
 """Relative decrease of the cost in a step below which a search ends: the pictures then differ by far less than is seen."""
-POLISHED = 2
-"""Starts that are polished: those with the least error once what the model is affine in is fitted."""
+POLISHED = 4
+"""Starts that are polished: that with the least error, and those with the least once what is affine is fitted."""
 PROPOSED = 12
 """Starts that the data suggests where there are others, at most."""
 AFFINE = ("diffuse", "specular", "share", "scatter", "retro")
@@ -40,7 +40,7 @@ class Fitted(NamedTuple):
     values: Values
     """Parameters of the model of all effects."""
     error: float
-    """RMS difference of the PQ signal over weighted pairs and channels, times 720: comparable to ΔE ITP."""
+    """RMS ΔE ITP of the pixels that were fitted, and of cells beside them (:mod:`.fitted_pixels`)."""
 
 
 @dataclass(frozen=True)
@@ -59,8 +59,13 @@ class _Free:
             out[g] = v
         return out
 
-    def columns(self, factor: Reals) -> Reals:
-        return np.stack([factor[:, g].sum(1) for g in self.groups], 1)
+    def factor(self, products: Reals) -> Reals:
+        """Of [J r] by what is free."""
+        moves = np.zeros((len(products), len(self.groups) + 1))
+        for k, g in enumerate(self.groups):
+            moves[g, k] = 1
+        moves[-1, -1] = 1
+        return factor(moves.T @ products @ moves)
 
 
 class _Start(NamedTuple):
@@ -101,9 +106,11 @@ class Screen:
             fewer = proposed[:: -(-len(proposed) // PROPOSED)] if near else proposed
             begin += [self._whole(names, v) for v in fewer]
         free = self._free(names)
-        ends = sorted((self._begun(self._vector(v), free) for v in begin), key=lambda start: start.promise)
+        begun = [self._begun(self._vector(v), free) for v in begin]
+        safe = min(begun, key=lambda start: start.cost)
+        ends = [safe, *sorted((s for s in begun if s is not safe), key=lambda start: start.promise)]
         cost, x = min((self._polished(start, free) for start in ends[:POLISHED]), key=lambda end: end[0])
-        return Fitted(names, self._values(x), 720 * float(np.sqrt(cost / self.linear.channels)))
+        return Fitted(names, self._values(x), float(np.sqrt(cost)))
 
     def extended(self, effects: Iterable[str], fitted: Fitted) -> Fitted:
         """The same values as a fit with more effects, all of which they leave without anything to do."""
@@ -173,8 +180,8 @@ class Screen:
     def _begun(self, x: Reals, free: _Free) -> _Start:
         from scipy.optimize import lsq_linear
 
-        factor = self.linear(x)
-        columns, r, y = free.columns(factor)[:, free.affine], factor[:, -1], free.of(x)
+        both, y = free.factor(self.linear(x)), free.of(x)
+        columns, r = both[:, :-1][:, free.affine], both[:, -1]
         lower, upper = (free.of(b)[free.affine] for b in (self.lower, self.upper))
         end = lsq_linear(columns, columns @ y[free.affine] - r, (lower, upper))
         y[free.affine] = np.clip(end.x, lower, upper)
@@ -183,12 +190,12 @@ class Screen:
     def _polished(self, start: _Start, free: _Free) -> tuple[float, Reals]:
         from scipy.optimize import least_squares
 
-        at = _Once(lambda y: self.linear(free.put(y, start.x)))
+        at = _Once(lambda y: free.factor(self.linear(free.put(y, start.x))))
         y = free.of(start.refitted)
         if (at(y)[:, -1] ** 2).sum() > start.cost:
             y = free.of(start.x)
         end = least_squares(
-            lambda y: at(y)[:, -1], y, lambda y: free.columns(at(y)), (free.of(self.lower), free.of(self.upper)),
+            lambda y: at(y)[:, -1], y, lambda y: at(y)[:, :-1], (free.of(self.lower), free.of(self.upper)),
             x_scale="jac", ftol=RTOL, xtol=RTOL, gtol=None, max_nfev=STEPS,
         )  # fmt: skip
         return 2 * end.cost, free.put(end.x, start.x)

@@ -8,14 +8,17 @@ Recommendation ITU-R BT.2100). So the weights sum the square of the visible diff
 from __future__ import annotations
 
 from dataclasses import dataclass
+from functools import cache
 from typing import Any
 
 import jax
+import jax.numpy as jnp
 import numpy as np
+from jaxtyping import Array, Float
 from numpy.typing import NDArray
 
 from ..angles import half_difference
-from ..reports.colours import luminance
+from ..reports.colours import library, luminance
 from ..tables import HalfDifferenceGrid
 from .difference import WHITE
 from .illumination import Extended, Illumination
@@ -119,6 +122,28 @@ def pq(shown: Any) -> Any:
     return ((C1 + C2 * y) / (1 + C3 * y)) ** M2
 
 
+LMS = np.array([[1688, 2146, 262], [683, 2951, 462], [99, 309, 3688]]) / 4096
+ITP = np.array([[2048, 2048, 0], [3305, -6806.5, 3501.5], [17933, -17390, -543]]) / 4096
+"""From linear RGB of BT.2020 to LMS, and from its PQ signal to ITP (BT.2100-2, table 7; BT.2124-0: T is half C_T)."""
+
+
+@cache
+def _to_lms() -> Reals:
+    """From linear sRGB."""
+    colour = library()
+    wide = colour.matrix_RGB_to_RGB(*(colour.RGB_COLOURSPACES[n] for n in ("sRGB", "ITU-R BT.2020")))
+    return np.asarray(LMS @ wide)
+
+
+def itp(shown: Float[Array, "... C"]) -> Float[Array, "... 3"]:
+    """720 ITP of linear values, where 1 is white: their distance is ΔE ITP. Below 0 is 0; but for three channels grey."""
+    shown = jnp.maximum(shown, 0)
+    if shown.shape[-1] != 3:
+        shown = jnp.broadcast_to(shown.mean(-1, keepdims=True), (*shown.shape[:-1], 3))
+    seen: Array = 720 * pq(shown @ _to_lms().T) @ ITP.T
+    return seen
+
+
 def visibility(shown: Reals) -> Reals:
     """dPQ/d ln L: how much a small relative change of a value is seen."""
     step = 1e-4
@@ -126,4 +151,4 @@ def visibility(shown: Reals) -> Reals:
     return np.asarray((pq(shown * (1 + step)) - pq(shown * (1 - step))) / (2 * step))
 
 
-__all__ = ["Seen", "pq", "seen", "visibility"]
+__all__ = ["Seen", "itp", "pq", "seen", "visibility"]

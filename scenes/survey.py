@@ -20,9 +20,9 @@ from ..tradeoff.timing import interleaved
 from .appearance import Look, look
 from .choose import Choice, Effects, Tried, choose
 from .difference import difference
+from .fitted_pixels import shown
 from .illumination import Illumination
 from .interpolated import measured
-from .pairs import shown
 from .rendering import Rendered, render
 from .sampling import techniques_of
 from .scene import MEASURES, Reals, Scene

@@ -10,7 +10,8 @@ from brdfit.fitting.starts import summarise
 from brdfit.models import parameter_values, parameters_of
 from brdfit.models.effects import EFFECTS, in_order
 from brdfit.scenes.appearance import look
-from brdfit.scenes.pairs import shown
+from brdfit.scenes.fitted_pixels import shown
+from brdfit.scenes.linear import factor
 from brdfit.scenes.scene import Ambient, Camera, Directional, Scene, Sphere
 from brdfit.scenes.screen import Fitted, Screen, alone, own
 
@@ -31,7 +32,7 @@ SETS = (
 
 def test_a_set_is_the_whole_model_with_the_rest_left_out():
     """To the rounding of GTR against GGX and of the sums."""
-    screen = Screen(AMONG, SimpleNamespace(scale=np.zeros((1, 3))), None)
+    screen = Screen(AMONG, SimpleNamespace(arriving=np.zeros((1, 3))), None)
     whole = jax.jit(lambda m: m(WI, WO))
     for name in SETS:
         names = in_order(name.split("+"))
@@ -66,18 +67,26 @@ def test_slopes(scene):
     x = screen._vector(screen._whole(names, {k: np.asarray(v) for k, v in values.items()}))
 
     def cost(x):
-        factor = screen.linear(x)
-        return float(factor[:, -1] @ factor[:, -1])
+        return screen.linear(x)[-1, -1]
 
     with jax.enable_x64(True):
         model = brdfit.model("+".join(names), **values)
         f = np.stack([np.asarray(type(model)(**one).evaluate(data.geometry)) for one in channels_of(model)], -1)
-        assert cost(x) == pytest.approx(float((np.asarray(data.residual(f)) ** 2).sum()), rel=1e-9)
-    factor, step = screen.linear(x), 1e-5
-    slopes = 2 * factor[:, :-1].T @ factor[:, -1]
+        assert cost(x) == pytest.approx(float((np.asarray(data.residual(data.values(f))) ** 2).sum()), rel=1e-9)
+    slopes, step = 2 * screen.linear(x)[-1, :-1], 1e-5
     for k in range(len(slopes)):
         moved = np.eye(len(x))[k] * step
-        assert (cost(x + moved) - cost(x - moved)) / (2 * step) == pytest.approx(slopes[k], rel=1e-5, abs=1e-9)
+        assert (cost(x + moved) - cost(x - moved)) / (2 * step) == pytest.approx(slopes[k], rel=1e-5, abs=1e-6)
+
+
+def test_factors():
+    """Of products of columns of which two are alike and one is 0."""
+    columns = np.random.default_rng(0).normal(size=(30, 5)) * [1, 1e-6, 1e6, 0, 1]
+    columns[:, 4] = columns[:, 0]
+    products = columns.T @ columns
+    size = np.linalg.norm(columns, axis=0)
+    got = factor(products)
+    assert (np.abs(got.T @ got - products) <= 1e-11 * np.outer(size, size) + 1e-290).all()
 
 
 def channels_of(model):
