@@ -18,8 +18,8 @@ from .result import Fit
 
 
 def fit_many(
-    tables: Iterable[Table | StrPath],
-    models: Sequence[Model] = ("gtr", "abc", "sgd", "ward", "ashikhmin_shirley"),
+    tables: Table | StrPath | Iterable[Table | StrPath],
+    models: Model | Sequence[Model] = ("gtr", "abc", "sgd", "ward", "ashikhmin_shirley"),
     *,
     workers: int | None = None,
     angles: str = "edge",
@@ -28,8 +28,8 @@ def fit_many(
     """Fit every model to every table; yields each :class:`~brdfit.Fit` as it completes, table after table.
 
     Args:
-        tables: Tables, or paths of table files, read when their turn comes.
-        models: Names, classes or instances, as :func:`brdfit.fit` takes them.
+        tables: Tables, or paths of table files, read when their turn comes; or one.
+        models: Names, classes or instances, as :func:`brdfit.fit` takes them; or one.
         workers: Fits at a time; one per core by default. Programs are compiled and run outside Python's lock.
         angles: Convention of MERL files given by path.
         options: Further arguments of :func:`brdfit.fit`.
@@ -37,6 +37,8 @@ def fit_many(
     A file that cannot be read and a fit that raises are failed results, with the reason in words. Wrong arguments (an
     unknown model or loss) raise ValueError or TypeError before the first fit.
     """
+    tables = [tables] if isinstance(tables, Table | str | os.PathLike) else tables
+    models = models if isinstance(models, Sequence) and not isinstance(models, str) else [models]
     for m in models:
         model_class(m, anisotropic=False)
     named_loss(options.get("loss", "log"))

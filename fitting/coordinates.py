@@ -7,9 +7,10 @@ valleys have a chart of their own (the reason stands at each).
 
 from __future__ import annotations
 
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, replace
 from functools import lru_cache
+from typing import Any
 
 import jax.numpy as jnp
 import numpy as np
@@ -18,11 +19,13 @@ from jaxtyping import Array
 from ..models import BRDF, parameters_of
 from ..models.abc import ABC
 from ..models.ashikhmin_shirley import AshikhminShirley, AshikhminShirleyAnisotropic
+from ..models.base import Parameter
 from ..models.fresnel import dielectric_f0
 from ..models.htsg import HTSG
 from ..models.parts import Composition
 from ..models.sgd import SGD
 from ..models.stam_diffraction import StamDiffraction
+from ..programs import program
 
 Scalars = dict[str, Array]
 Map = Callable[[Scalars], Scalars]
@@ -92,43 +95,55 @@ class Chart:
         """The model of one channel, its parameters scalars."""
         return self.cls(**self.parameters(own, shared))
 
-    def raw_coordinates(self, parameters: dict[str, np.ndarray], channels: int) -> np.ndarray:
-        """Vector of given parameters (arrays ``[]`` or ``[C]``)."""
-        rows = []
-        for k in range(channels):
-            scalars = {n: jnp.asarray(v if np.ndim(v) == 0 else v[k]) for n, v in parameters.items()}
-            rows.append({n: float(v) for n, v in self.from_parameters(scalars).items()})
-        return np.array([rows[k or 0][c.name] for c, k in self.vector(channels)])
+    def vectors(self, proposals: Sequence[Mapping[str, np.ndarray]], channels: int) -> np.ndarray:
+        """A vector ``[n]`` for each of some sets of parameters (arrays ``[]`` or ``[C]``), wherever it lies."""
+        names = list(proposals[0])
+        each = {n: np.stack([np.broadcast_to(np.asarray(p[n], float), channels) for p in proposals]) for n in names}
+        found = {n: np.asarray(v) for n, v in _coordinates(self, each).items()}
+        return np.stack([found[c.name][:, k or 0] for c, k in self.vector(channels)], -1)
 
-    def coordinates_of(self, parameters: dict[str, np.ndarray], channels: int) -> np.ndarray:
+    def raw_coordinates(self, parameters: Mapping[str, np.ndarray], channels: int) -> np.ndarray:
+        """Vector of given parameters (arrays ``[]`` or ``[C]``)."""
+        vector: np.ndarray = self.vectors([parameters], channels)[0]
+        return vector
+
+    def coordinates_of(self, parameters: Mapping[str, np.ndarray], channels: int) -> np.ndarray:
         """Vector of given parameters, moved into the box where outside."""
-        x = self.raw_coordinates(parameters, channels)
-        lower, upper = self.box(channels)
-        inside: np.ndarray = np.clip(np.nan_to_num(x, nan=0.0, posinf=1e300, neginf=-1e300), lower, upper)
-        return inside
+        return into(self.raw_coordinates(parameters, channels), *self.box(channels))
 
     def continues(self, x: np.ndarray, channels: int) -> bool:
         """Whether an optimum at x may go on in the next chart."""
         shared = x[channels * len(self.channel) :]
         return self.end is not None and self.end({c.name: float(v) for c, v in zip(self.shared, shared, strict=True)})
 
-    def box(self, channels: int) -> tuple[np.ndarray, np.ndarray]:
-        """Lower and upper bounds of a vector."""
+    def box(self, channels: int, bounds: Mapping[str, tuple[float, float]] | None = None) -> tuple[np.ndarray, np.ndarray]:
+        """Lower and upper bounds of a vector. ``bounds`` of parameters, in a plain chart, replace those of the search."""
         order = self.vector(channels)
-        return np.array([c.lower for c, _ in order]), np.array([c.upper for c, _ in order])
+        own = {p.name: _ends(p, *bounds[p.name]) for p in parameters_of(self.cls) if p.name in bounds} if bounds else {}
+        ends = [own.get(c.parameter, (c.lower, c.upper)) for c, _ in order]
+        return np.array([lower for lower, _ in ends]), np.array([upper for _, upper in ends])
 
 
-def plain_chart(cls: type[BRDF], bounds: tuple[tuple[str, float, float], ...] = ()) -> Chart:
-    """Each parameter its own coordinate, logarithms where it says so; ``bounds`` replace the default search box."""
-    boxes = {name: (lower, upper) for name, lower, upper in bounds}
+@program
+def _coordinates(chart: Chart, parameters: Mapping[str, Any]) -> Scalars:
+    return chart.from_parameters(dict(parameters))
+
+
+def into(x: np.ndarray, lower: np.ndarray, upper: np.ndarray) -> np.ndarray:
+    """Vectors moved into a box where outside; what is not a number, to 0."""
+    inside: np.ndarray = np.clip(np.nan_to_num(x, nan=0.0, posinf=1e300, neginf=-1e300), lower, upper)
+    return inside
+
+
+def _ends(p: Parameter, lower: float, upper: float) -> tuple[float, float]:
+    """Ends of a parameter's coordinate; a logarithm begins with the smallest number that a formula can take, not with 0."""
+    return (float(np.log(max(lower, 1e-300))), float(np.log(upper))) if p.log else (float(lower), float(upper))
+
+
+def plain_chart(cls: type[BRDF]) -> Chart:
+    """Each parameter its own coordinate, logarithms where it says so."""
     logs = frozenset(p.name for p in parameters_of(cls) if p.log)
-    coordinates = []
-    for p in parameters_of(cls):
-        lower, upper = boxes.get(p.name, p.search)
-        if p.log:
-            # a bound at 0 of a logarithmic coordinate is the smallest number that keeps the formula in range
-            lower, upper = np.log(max(lower, 1e-300)), np.log(upper)
-        coordinates.append(Coordinate(p.name, p.name, p.per_channel, float(lower), float(upper), p.linear))
+    coordinates = [Coordinate(p.name, p.name, p.per_channel, *_ends(p, *p.search), p.linear) for p in parameters_of(cls)]
 
     def to_parameters(x: Scalars) -> Scalars:
         return {n: jnp.exp(v) if n in logs else v for n, v in x.items()}
@@ -281,12 +296,12 @@ def _sgd_chart() -> Chart:
 
 
 @lru_cache(maxsize=256)
-def charts(cls: type[BRDF], plain: bool = False, bounds: tuple[tuple[str, float, float], ...] = ()) -> tuple[Chart, ...]:
+def charts(cls: type[BRDF], plain: bool = False) -> tuple[Chart, ...]:
     """The charts a fit of ``cls`` searches in, cached so that a second fit finds its program compiled.
 
     ``plain`` asks for one coordinate a parameter, which held or bounded parameters need.
     """
-    if not plain and not bounds:
+    if not plain:
         if issubclass(cls, Composition) and cls.effects:
             chart = _composed_chart(cls)
             return (chart, _composed_chart(cls, narrow=False)) if chart.end else (chart,)
@@ -298,4 +313,4 @@ def charts(cls: type[BRDF], plain: bool = False, bounds: tuple[tuple[str, float,
             return (_wave_chart(cls),)
         if cls in (AshikhminShirley, AshikhminShirleyAnisotropic):
             return (_with_trade_off(plain_chart(cls)),)
-    return (plain_chart(cls, bounds),)
+    return (plain_chart(cls),)

@@ -17,7 +17,7 @@ from numpy.typing import NDArray
 
 from ..models import BRDF, channels, parameter_values, parameters_of, variants
 from ..tables import Table
-from .coordinates import Chart, charts
+from .coordinates import Chart, charts, into
 from .effort import DEFAULT, Effort
 from .estimate import Judgement, errors_of, judge, make_ready
 from .gram import Problem, Span
@@ -57,6 +57,8 @@ class Prepared:
     """The loss, bound to the table."""
     losses: tuple[Loss, ...]
     """Every loss that errors are reported under, bound to the table."""
+    seconds: float
+    """What that took, nothing compiled: for all fits that share it."""
 
 
 _prepared: WeakKeyDictionary[Table, dict[Any, Prepared]] = WeakKeyDictionary()
@@ -75,7 +77,10 @@ def prepare(
     key = (max_angle, measure, loss, effort.nodes, compressed)
     with jax.enable_x64(True), _preparing:
         kept = _prepared.setdefault(table, {})
-        if key not in kept:
+        if key in kept:
+            return kept[key]
+        with compilation() as compiled:
+            begin = time.perf_counter()
             cells, used = samples(table, max_angle, measure, effort.nodes)
             values = table.planes[:, used]
             bound = loss.bind(values)
@@ -83,7 +88,9 @@ def prepare(
             named = in_threads(lambda v: _named_losses(v, bound), [values])
             kept.clear()
             both = compress(cells, table, used, max_angle, measure, bound) if compressed else cells
-            kept[key] = Prepared(both, used, next(summary), bound, next(named))
+            summarised, losses = next(summary), next(named)
+            took = time.perf_counter() - begin - compiled.away
+        kept[key] = Prepared(both, used, summarised, bound, losses, took)
         return kept[key]
 
 
@@ -97,7 +104,9 @@ def model_class(model: Model, anisotropic: bool) -> type[BRDF]:
         return next((f for f in forms if f.anisotropic == anisotropic), forms[0])
     cls = model if isinstance(model, type) else type(model)
     if not issubclass(cls, BRDF) or not parameters_of(cls):
-        raise TypeError(f"a model is a name, a BRDF or a BRDF class with declared parameters, not {model!r}")
+        raise TypeError(
+            f"a model is a name, a brdfit.BRDF or a subclass of it with fields declared by brdfit.parameter, not {model!r}"
+        )
     return cls
 
 
@@ -188,12 +197,12 @@ def _fit(
     effort: Effort,
 ) -> Fit:
     """As :func:`fit`, with settings that are known."""
+    _check_table(table)
     cls = model_class(model, (not table.isotropic) if anisotropic is None else anisotropic)
     held: Named = {n: np.asarray(v, float) for n, v in fixed.items()}
     given = _given_start(cls, model, start, table)
     _check_names(cls, {**held, **given, **dict(bounds)})
     _check_bounds(cls, bounds)
-    begin = time.perf_counter()
     with jax.enable_x64(True), compilation() as compiled:
         ready = prepare(table, max_angle, measure, loss, effort)
         used, bound_loss = ready.used, ready.loss
@@ -212,11 +221,9 @@ def _fit(
         }
         if not used.any():
             reason = f"no measured cell has both polar angles within {max_angle:g} degrees: nothing to fit"
-            return _nothing(
-                frame, reason, {"load": table.seconds, "prepare": prepared - begin - early, "compile": early, "solve": 0.0}
-            )
-        box = tuple(sorted((n, float(a), float(b)) for n, (a, b) in bounds.items()))
-        forms = charts(cls, bool(held), box)
+            seconds = {"load": table.seconds, "prepare": ready.seconds, "compile": compiled.seconds, "solve": 0.0}
+            return _nothing(frame, reason, seconds)
+        forms = charts(cls, plain=bool(held or bounds))
         every = list(starts(cls, ready.summary, seed))
         count = max(math.ceil(effort.shapes * len(every)), 0 if given else 1)
         proposals = [every[i * len(every) // count] for i in range(count)]
@@ -226,7 +233,7 @@ def _fit(
         named = ready.losses
         if effort.error_bars:
             make_ready(Problem(ready.samples, bound_loss, forms[0]), named)
-        found = _search(forms, ready.samples, bound_loss, proposals, frozenset(held), effort)
+        found = _search(forms, ready.samples, bound_loss, proposals, frozenset(held), bounds, effort)
         found, judged = settle(found, Problem(ready.samples, bound_loss, found[0].problem.chart), named, effort)
         errors = judged.errors
     converged, reason = _verdict(found, effort.rtol)
@@ -240,7 +247,7 @@ def _fit(
         errors={e.name: float(v) for e, v in zip(named, errors, strict=True)},
         seconds={
             "load": table.seconds,
-            "prepare": prepared - begin - early,
+            "prepare": ready.seconds,
             "compile": compiled.seconds,
             "solve": max(solve, 0.0),
         },
@@ -289,13 +296,22 @@ def evaluate(
     sqrt(sum w r^2 / sum w) over the cells with both polar angles at most ``max_angle`` degrees and all channels; with
     ``loss`` also under a loss of your own. Use it to see how a published fit or another tool's result does.
 
-    Raises ValueError if the model has neither one channel nor as many as the table.
+    Raises ValueError if the model has neither one channel nor as many as the table, TypeError for what is no table or model.
     """
+    _check_table(table)
+    if not isinstance(model, BRDF):
+        raise TypeError(f"evaluate takes a model with parameters (brdfit.model, fit.model), not {model!r}")
     if channels(model) not in (1, table.channels):
         raise ValueError(f"the model has {channels(model)} channels and the table {table.channels}")
+    own = None if loss is None else named_loss(loss)
     with jax.enable_x64(True):
-        ready = prepare(table, max_angle, measure, LOSSES["log"] if loss is None else named_loss(loss))
-        named = ready.losses
+        at_hand = (
+            p for key, p in _prepared.get(table, {}).items() if key[:2] == (max_angle, measure) and own in (None, key[2])
+        )
+        ready = next(at_hand, None) or prepare(
+            table, max_angle, measure, own or LOSSES["log"], replace(DEFAULT, path="exact")
+        )
+        named = tuple(x for x in ready.losses if own is not None or x.name in LOSSES)
         values = np.asarray(errors_of(model, ready.samples, named))
     return {e.name: float(v) for e, v in zip(named, values, strict=True)}
 
@@ -312,6 +328,7 @@ def _search(
     loss: Loss,
     proposals: list[Named],
     fixed: frozenset[str],
+    bounds: Mapping[str, tuple[float, float]],
     effort: Effort,
 ) -> list[Found]:
     """Best optimum of the whole problem, or of each channel where nothing ties the channels together."""
@@ -321,30 +338,19 @@ def _search(
     for part in [[c] for c in range(channels)] if apart else [list(range(channels))]:
         cells = blocks.channel(part[0]) if apart else blocks
         problems = []
+        mine = [{n: v if v.ndim == 0 else v[part] for n, v in p.items()} for p in proposals]
         for chart in forms:
-            lower, upper = chart.box(len(part))
-            free = [c.parameter not in fixed for c, _ in chart.vector(len(part))]
-            begin = [
-                chart.coordinates_of({n: v if v.ndim == 0 else v[part] for n, v in p.items()}, len(part)) for p in proposals
-            ]
-            box = Box(lower, upper, np.asarray(free))
-            if fixed:  # a held parameter may lie outside the box that a fit searches
-                held = ~np.asarray(free)
-                exact = np.array([_unclipped(chart, p, part) for p in proposals])
-                begin = [np.where(held, e, b) for e, b in zip(exact, begin, strict=True)]
-                box = Box(
-                    np.where(held, np.minimum(lower, begin[0]), lower),
-                    np.where(held, np.maximum(upper, begin[0]), upper),
-                    box.free,
-                )
-            begin = [x for i, x in enumerate(begin) if not any(np.array_equal(x, y) for y in begin[:i])]
-            problems.append((Problem(cells, loss, chart), box, begin))
+            lower, upper = chart.box(len(part), bounds)
+            held = np.array([c.parameter in fixed for c, _ in chart.vector(len(part))])
+            exact = chart.vectors(mine, len(part))
+            begin = np.where(held, exact, into(exact, lower, upper))
+            # a held parameter may lie outside the box that a fit searches
+            lower = np.where(held, np.minimum(lower, begin[0]), lower)
+            upper = np.where(held, np.maximum(upper, begin[0]), upper)
+            distinct = [x for i, x in enumerate(begin) if not any(np.array_equal(x, y) for y in begin[:i])]
+            problems.append((Problem(cells, loss, chart), Box(lower, upper, ~held), distinct))
         found.append(search(problems, effort))
     return found
-
-
-def _unclipped(chart: Chart, parameters: Named, part: list[int]) -> NDArray[np.float64]:
-    return chart.raw_coordinates({n: v if v.ndim == 0 else v[part] for n, v in parameters.items()}, len(part))
 
 
 def _scaled(found: list[Found], error: float) -> tuple[Optimum, ...]:
@@ -352,6 +358,11 @@ def _scaled(found: list[Found], error: float) -> tuple[Optimum, ...]:
     optima = max((f.optima for f in found), key=len)
     best = optima[0].error or 1.0
     return tuple(Optimum(o.error / best * error, o.starts) for o in optima)
+
+
+def _check_table(table: Any) -> None:
+    if not isinstance(table, Table):
+        raise TypeError(f"a table is what brdfit.load or brdfit.measurements returns, not {table!r:.100}")
 
 
 def _given_start(cls: type[BRDF], model: Model, start: Mapping[str, ArrayLike] | str | None, table: Table) -> Named:
@@ -415,7 +426,7 @@ def _exact(end: Minimum) -> bool:
 def _ending(end: Minimum, rtol: float) -> tuple[bool, str]:
     error, cosine, steps = float(np.sqrt(end.cost)), float(end.optimality), int(end.steps)
     if not np.isfinite(error) or error > 1e140:
-        return False, "no start gave a finite error: the model is not defined where the data are"
+        return False, "no start gave a finite error: the model or the loss is not defined where the data are"
     if _exact(end):
         return True, f"exact fit: the error is {error:.1g}, which is rounding"
     if not bool(end.stopped):

@@ -136,6 +136,9 @@ def spread_order(n: int) -> NDArray[np.int64]:
 def _scattered_samples(table: Table, used: NDArray[np.bool_], weight: Reals, limit: float) -> Samples:
     wi, wo = (v[used] for v in table.layout.directions())
     values, share = table.planes[:, used], weight[used]
+    if not used.any():  # one sample of weight 0 stands for none
+        wi = wo = np.array([[0.0, 0.0, 1.0]])
+        values, share = np.zeros((table.channels, 1)), np.zeros(1)
     slots = _band_slots(wi, wo)
     banded = slots.shape[1:]
     slots = slots.reshape(len(slots), -1)

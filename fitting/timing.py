@@ -69,11 +69,17 @@ def waited(begin: float, end: float) -> None:
 
 @contextmanager
 def compilation() -> Iterator[Compilation]:
-    """Adds up what is compiled inside the block, by this thread and by those that take over its context."""
+    """Adds up what is compiled inside the block, by this thread and by those that take over its context.
+
+    A block within another counts for both.
+    """
     _listen()
-    counted = Compilation()
+    outer, counted = _current.get(), Compilation()
     token = _current.set(counted)
     try:
         yield counted
     finally:
         _current.reset(token)
+        if outer is not None:
+            outer.spans += counted.spans
+            outer.waits += counted.waits

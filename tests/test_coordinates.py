@@ -81,9 +81,9 @@ def test_starts_outside_are_moved_in(cls, plain, k):
 
 
 def test_bounds_replace_the_box():
-    chart = charts(GTR, False, (("alpha", 0.1, 0.3), ("diffuse", 0.0, 0.5)))
+    chart = charts(GTR, plain=True)
     assert len(chart) == 1
-    lower, upper = chart[0].box(2)
+    lower, upper = chart[0].box(2, {"alpha": (0.1, 0.3), "diffuse": (0.0, 0.5)})
     order = [c.name for c, _ in chart[0].vector(2)]
     for name, want in (("alpha", np.log([0.1, 0.3])), ("diffuse", [0, 0.5]), ("gamma", np.log([0.01, 1e7]))):
         at = [i for i, n in enumerate(order) if n == name]

@@ -174,7 +174,7 @@ def test_an_anisotropic_model_needs_the_azimuth():
     ("options", "error", "text"),
     [
         ({"model": "wrad"}, ValueError, "unknown model 'wrad': choose from gtr, abc"),
-        ({"model": 3}, TypeError, "a model is a name, a BRDF or a BRDF class"),
+        ({"model": 3}, TypeError, "a model is a name, a brdfit.BRDF or a subclass"),
         ({"loss": "lgo"}, ValueError, "unknown loss 'lgo'"),
         ({"measure": "area"}, ValueError, "unknown measure 'area'"),
         ({"max_angle": 95}, ValueError, "max_angle must lie in"),
