@@ -2,8 +2,6 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterable
-
 REFERENCES: dict[str, str] = {
     # models and their parts
     "lambert1760": "Lambert, J. H. (1760). Photometria sive de mensura et gradibus luminis, colorum et umbrae. Augsburg:"
@@ -99,8 +97,6 @@ REFERENCES: dict[str, str] = {
     "sharma2005": "Sharma, G., Wu, W., Dalal, E. N. (2005). The CIEDE2000 color-difference formula. Color Research and "
     "Application 30(1), 21-30. doi:10.1002/col.20070",
     # estimation, uncertainty, software
-    "more1978": "Moré, J. J. (1978). The Levenberg-Marquardt algorithm: implementation and theory. In Numerical "
-    "Analysis, Lecture Notes in Mathematics 630, 105-116. doi:10.1007/BFb0067700",
     "white1980": "White, H. (1980). A heteroskedasticity-consistent covariance matrix estimator and a direct test for "
     "heteroskedasticity. Econometrica 48(4), 817-838. doi:10.2307/1912934",
     "kunsch1989": "Künsch, H. R. (1989). The jackknife and the bootstrap for general stationary observations. Annals of"
@@ -114,21 +110,4 @@ REFERENCES: dict[str, str] = {
 }
 """Full citations by key."""
 
-OF_LOSS: dict[str, tuple[str, ...]] = {
-    "log": ("low2012",),
-    "low": ("low2012",),
-    "bieron": ("bieron2020",),
-    "ngan": ("ngan2005",),
-    "cuberoot": ("fores2012",),
-    "relative": (),
-    "perceptual": ("lavoue2021",),
-}
-"""Keys of what each named loss is taken from."""
-
-
-def cite(keys: Iterable[str]) -> list[str]:
-    """Full citations of ``keys``, sorted, each once. A key that is not known is a citation already: it stands as it is."""
-    return sorted({REFERENCES.get(k, k) for k in keys})
-
-
-__all__ = ["OF_LOSS", "REFERENCES", "cite"]
+__all__ = ["REFERENCES"]

@@ -1,6 +1,6 @@
 """Published fits to measured materials, and tables made from known parameters (:mod:`.synthetic`)."""
 
-from .presets import preset, published_abc, published_fits, published_sgd, published_sgd_smith, published_start
+from .presets import preset, published_abc, published_sgd, published_sgd_smith, published_start
 from .published import NGAN_SCALE, forms, formula, published_materials, raw, source
 from .published_sgd import PublishedSGD
 
@@ -11,7 +11,6 @@ __all__ = [
     "formula",
     "preset",
     "published_abc",
-    "published_fits",
     "published_materials",
     "published_sgd",
     "published_sgd_smith",

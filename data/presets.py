@@ -15,7 +15,7 @@ from ..models import BRDF, build, model, ndf, parameter_values
 from ..models.abc import ABC
 from ..models.factory import microfacet
 from ..models.sgd import SGD
-from .published import NGAN_SCALE, forms, published_materials, raw
+from .published import NGAN_SCALE, published_materials, raw
 from .published_sgd import PublishedSGD
 
 Model = TypeVar("Model", bound=BRDF)
@@ -32,11 +32,6 @@ def preset(form: str, material: str) -> BRDF:
     """
     row = raw(form, material)
     return _PRESETS[form](row)
-
-
-def published_fits(material: str) -> dict[str, BRDF]:
-    """Every published fit to a material by its form; none for a material that no one has fitted."""
-    return {form: preset(form, material) for form in forms() if material in published_materials(form)}
 
 
 def published_start(name: str, material: str) -> dict[str, NDArray[np.float64]] | None:
@@ -199,4 +194,4 @@ def _sgd_peaks(alpha: Array, p: Array) -> Array:
     return jax.vmap(lambda a, q: ndf.SGD(a, q)(jnp.zeros(()), jnp.ones(())))(alpha, p)
 
 
-__all__ = ["preset", "published_abc", "published_fits", "published_sgd", "published_sgd_smith", "published_start"]
+__all__ = ["preset", "published_abc", "published_sgd", "published_sgd_smith", "published_start"]

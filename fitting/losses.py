@@ -8,6 +8,7 @@ here, each after the paper it comes from. f: model, m: measured, i: incident, o:
 from __future__ import annotations
 
 from collections.abc import Callable
+from dataclasses import replace
 
 import equinox as eqx
 import jax
@@ -36,6 +37,8 @@ class Loss(eqx.Module):
     """The value f of T(f)."""
     separable: bool = eqx.field(static=True, default=True)
     """Whether the residual of a channel depends on that channel alone, which lets channels be fitted one by one."""
+    meaning: str = eqx.field(static=True, default="")
+    """What it compares, in a few words."""
 
     def __call__(self, predicted: Values, measured: Values, g: Geometry) -> Values:
         """Residual of values ``[..., C]`` in 1/sr at a geometry ``[...]``."""
@@ -65,7 +68,7 @@ class Relative(Loss):
         if median == 0:
             positive = measured[measured > 0]
             median = float(np.median(positive)) if positive.size else 1.0
-        return Relative(self.name, self.source, self.function, eps=np.float64(median / 1000))
+        return replace(self, eps=np.float64(median / 1000))
 
 
 @jax.custom_jvp
@@ -128,16 +131,16 @@ _PERCEPTUAL = (lambda f, g: _cbrt(f * g.cos_i) * _cbrt(g.cos_o), lambda t, g: t*
 LOSSES: dict[str, Loss] = {
     loss.name: loss
     for loss in (
-        Loss("log", "low2012", _log, None, *_LOG),
-        Loss("low", "low2012", _log, _uniform_theta_o, *_LOG),
-        Loss("bieron", "bieron2020", _log, _cos_o, *_LOG),
-        Loss("ngan", "ngan2005", _ngan, None, *_NGAN),
-        Loss("cuberoot", "fores2012", _cuberoot, None, *_CUBEROOT),
-        Relative("relative", "brdfit", _relative),
-        Loss("perceptual", "lavoue2021", _perceptual, _cos_o, *_PERCEPTUAL),
+        Loss("log", "low2012", _log, None, *_LOG, meaning="ln(1 + f cos θi)"),
+        Loss("low", "low2012", _log, _uniform_theta_o, *_LOG, meaning="log, θo uniform (Löw)"),
+        Loss("bieron", "bieron2020", _log, _cos_o, *_LOG, meaning="log, weighted cos θo"),
+        Loss("ngan", "ngan2005", _ngan, None, *_NGAN, meaning="(f \u2212 m) cos θi"),
+        Loss("cuberoot", "fores2012", _cuberoot, None, *_CUBEROOT, meaning="cube root of f cos θi"),
+        Relative("relative", "brdfit", _relative, meaning="(f \u2212 m)/m"),
+        Loss("perceptual", "lavoue2021", _perceptual, _cos_o, *_PERCEPTUAL, meaning="ranks fits as people do"),
     )
 }
-"""Every named loss, in the order reports show them."""
+"""Every named loss, in the order reports show them after the perceptual one, which ranks fits."""
 
 
 def named_loss(loss: str | Loss | LossFunction) -> Loss:

@@ -2,8 +2,6 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterable
-
 import numpy as np
 from jaxtyping import ArrayLike
 
@@ -156,11 +154,6 @@ def parameter_values(m: BRDF) -> dict[str, np.ndarray]:
     return {p.name: np.asarray(getattr(m, p.name)) for p in parameters_of(m)}
 
 
-def names() -> Iterable[str]:
-    """Names of all models."""
-    return MODELS.keys()
-
-
 __all__ = [
     "BRDF",
     "EFFECTS",
@@ -172,7 +165,6 @@ __all__ = [
     "compose",
     "evaluate_channels",
     "model",
-    "names",
     "parameter",
     "parameter_values",
     "parameters_of",

@@ -50,6 +50,8 @@ class Masking:
     references: tuple[str, ...]
     needs_alpha: bool = False
     """Whether it is a function of the width alpha of the distribution, which must have one."""
+    integral: bool = False
+    """Whether it is Smith's integral over the distribution."""
 
 
 @dataclass(frozen=True)
@@ -213,8 +215,11 @@ MASKINGS: dict[str, Masking] = {
         masking.smith_correlated,
         "G = 1/(1 + Lambda(l) + Lambda(v)), Smith's Lambda of D",
         ("smith1967", "heitz2014"),
+        integral=True,
     ),
-    "smith_separable": Masking(masking.smith_separable, "G = G1(l) G1(v), Smith's G1 of D", ("smith1967", "heitz2014")),
+    "smith_separable": Masking(
+        masking.smith_separable, "G = G1(l) G1(v), Smith's G1 of D", ("smith1967", "heitz2014"), integral=True
+    ),
     "vcavity": Masking(
         lambda lobe, g: masking.vcavity(g),
         "G = min(1, 2 (n.h)(n.l)/(l.h), 2 (n.h)(n.v)/(l.h))",

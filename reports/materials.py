@@ -46,30 +46,39 @@ SUBSTANCES: tuple[Substance, ...] = (
 GAP = (0.20, 0.45)
 """Between the brightest dielectrics and the darkest metals hardly any material lies (Hoffman gives 20-40 % and 20-45 %)."""
 
+NEAR = 0.1
+"""Difference from a substance beyond which it tells nothing: several listed ones are nearer to each other than twice this."""
+
+COLOURED = 0.1
+"""Spread of F0 over the channels, relative to its mean, that dispersion gives no dielectric (diamond: 4 %)."""
+
 WATER = 0.02
 """The lowest F0 of an ordinary substance."""
 
 
 def nearest(f0: ArrayLike) -> tuple[Substance, float]:
-    """The substance nearest to an F0 ``[3]`` in linear sRGB, and its Euclidean distance."""
+    """The substance nearest to an F0 ``[3]`` in linear sRGB, and the largest relative difference of a channel from it."""
     f0 = np.asarray(f0, float)
     if f0.shape != (3,):
         raise ValueError(f"F0 is compared as linear RGB, three numbers, not shape {list(f0.shape)}")
     table: NDArray[np.float64] = np.array([s.f0 for s in SUBSTANCES])
-    distance = np.linalg.norm(table - f0, axis=1)
+    distance = np.abs(f0 / table - 1).max(1)
     k = int(np.argmin(distance))
     return SUBSTANCES[k], float(distance[k])
 
 
 def kind_of(f0: ArrayLike) -> str:
     """What an F0 (scalar or one value per channel) says about the kind of substance, in words."""
-    level = float(np.mean(np.asarray(f0, float)))
+    f0 = np.asarray(f0, float)
+    level = float(np.mean(f0))
     if not np.isfinite(level):
         return "F0 is not a number"
     if level < 0:
         return "negative: no substance"
     if level < WATER:
         return "below water (0.02), the lowest of ordinary substances"
+    if level <= GAP[0] and np.ptp(f0) > COLOURED * level:
+        return "as low as dielectrics, but coloured as none is: more a scale than a substance"
     if level <= GAP[0]:
         return "in the range of dielectrics"
     if level < GAP[1]:

@@ -36,15 +36,8 @@ def physics_view(f: Fit, label: str, evidence: Evidence | None, rows: dict[str, 
             "value": words.triple(f0),
             "kind": materials.kind_of(f0),
             "warn": bool(materials.GAP[0] < float(np.mean(f0)) < materials.GAP[1] or np.mean(f0) > 1),
-            "nearest": None,
         }
-        if f0.shape == (3,) and np.isfinite(f0).all():
-            substance, distance = materials.nearest(f0)
-            view["f0"]["nearest"] = substance.name
-            view["f0"]["nearest_value"] = " ".join(f"{v:.3g}" for v in substance.f0)
-            view["f0"]["distance"] = significant(distance, 2)
-            view["f0"]["far"] = distance > 0.15
-            view["f0"]["swatch"], view["f0"]["nearest_swatch"] = _hex(f0), _hex(np.array(substance.f0))
+        view["f0"] |= _nearest(f, f0)
     if width is not None:
         view["width"] = {
             "half": significant(math.degrees(width.half_width), 3),
@@ -58,6 +51,51 @@ def physics_view(f: Fit, label: str, evidence: Evidence | None, rows: dict[str, 
         view["energy"] = physics.energy_verdict(evidence.albedo.fitted[m], evidence.albedo.error[m], angles)
         view["energy_warn"] = view["energy"].startswith(("returns", "albedo"))
     return view
+
+
+def _nearest(f: Fit, f0: np.ndarray) -> View:
+    """The substance that an F0 is near to, or why none is named."""
+    if f0.shape != (3,) or not np.isfinite(f0).all():
+        return {"nearest": None, "why": "only for three channels", "swatch": None}
+    view: View = {"nearest": None, "swatch": _hex(f0)}
+    error = _f0_error(f, f0)
+    substance, distance = materials.nearest(f0)
+    if error > materials.NEAR:
+        return view | {"why": f"none named: F0 is known to ± {words.percent(error)} only"}
+    if distance > materials.NEAR:
+        return view | {"why": f"none within {materials.NEAR:.0%}".replace("%", " %")}
+    value = " ".join(f"{v:.3g}" for v in substance.f0)
+    return view | {
+        "nearest": substance.name,
+        "nearest_value": value,
+        "distance": words.percent(distance),
+        "nearest_swatch": _hex(np.array(substance.f0)),
+    }
+
+
+def _f0_error(f: Fit, f0: np.ndarray) -> float:
+    """Largest relative error bar of F0: those of the parameters to first order, with their correlations."""
+    import jax
+
+    found, count = 0.0, len(f.labels)
+    correlation = np.nan_to_num(f.correlation) if f.correlation.shape == (count, count) else np.eye(count)
+    for c in range(len(f0)):
+        with jax.enable_x64(True):
+            slope = jax.grad(lambda m: m.normal_reflectance())(physics.channel(f.model, c))
+        step = np.zeros(len(f.labels))
+        for name, value in f.parameters.items():
+            label = f"{name}[{c}]" if value.ndim else name
+            if label in f.labels:
+                step[f.labels.index(label)] = float(getattr(slope, name)) * _error_bar(f, name)[c if value.ndim else 0]
+        found = max(found, math.sqrt(max(float(step @ correlation @ step), 0.0)) / max(abs(float(f0[c])), 1e-30))
+    return found
+
+
+def _error_bar(f: Fit, name: str) -> np.ndarray:
+    """The larger of noise and spread for each element of a parameter, 0 where neither is known."""
+    both = [np.nan_to_num(np.atleast_1d(u.get(name, 0.0))) for u in (f.stderr, f.spread)]
+    bar: np.ndarray = np.maximum(*np.broadcast_arrays(*both, np.atleast_1d(f.parameters[name]))[:2])
+    return bar
 
 
 def _hex(linear: np.ndarray) -> str:
@@ -84,8 +122,10 @@ def model_view(f: Fit, label: str, channel_names: tuple[str, ...], published: Pu
 
 def _formula(f: Fit) -> str:
     """The first paragraph of the model's own documentation, which holds the formula."""
+    from ..catalogue import prose
+
     doc = (type(f.model).__doc__ or "") if f.model is not None else ""
-    return " ".join(doc.split("\n\n")[0].split())
+    return prose(doc.split("\n\n")[0])
 
 
 def _parameters(f: Fit, channel_names: tuple[str, ...]) -> View:
@@ -140,7 +180,14 @@ def _published(f: Fit, published: Published) -> View:
     rows = []
     for name, errors in (("this fit", f.errors), ("published fit", published.errors)):
         rows.append({"name": name, "errors": [significant(errors.get(loss, math.nan), 3) for loss in losses]})
-    return {"source": published.source, "losses": losses, "rows": rows}
+    said = ""
+    fitted, ranking = (f.errors.get(k, math.nan) / published.errors.get(k, math.nan) for k in (f.loss, "perceptual"))
+    if fitted < 1 < ranking:
+        said = (
+            f"The published fit is closer under the perceptual error, which ranks fits here; this fit is closer under "
+            f"{f.loss}, which it was fitted by. Where the perceptual error is what counts, fit by it: --loss perceptual."
+        )
+    return {"source": published.source, "losses": losses, "rows": rows, "said": said}
 
 
 def _range(lower: float, upper: float, open_lower: bool = False, open_upper: bool = False) -> str:
@@ -180,6 +227,10 @@ def _remarks(f: Fit, channel_names: tuple[str, ...]) -> list[View]:
         say(f"at a bound of the search box: {names(at_box)}. A wider box may fit better.", True)
     if f.undetermined:
         say(f"not determined by the data: {names(f.undetermined)}. Other values do about as well.", True)
+    vague = _vague(f)
+    if vague:
+        shown = names(f"{e} ({significant(v, 2)} ± {significant(bar, 2)})" for e, v, bar in vague)
+        say(f"not determined by these data, with error bars beyond the values themselves: {shown}.", True)
     if f.fixed:
         say(f"held fixed: {names(f.fixed)}.")
     pairs = f.strong_correlations()
@@ -213,8 +264,27 @@ def _remarks(f: Fit, channel_names: tuple[str, ...]) -> list[View]:
         )
     elif misfit:
         say(f"the form of the model, not noise, limits {words.listed(misfit)}.")
+    elif governing and all(g == "both" for g in governing.values()):
+        say(
+            "for every parameter the spread over angular bands is about what noise alone makes it: no sign that the form of "
+            "the model limits these numbers."
+        )
     if f.model is None and f.parameters:
         say("the code of this model is not part of the package: its numbers are kept, its formula is not.")
+    return out
+
+
+def _vague(f: Fit) -> list[tuple[str, float, float]]:
+    """Elements, values and error bars of positive parameters whose error bars exceed them."""
+    from ..models import parameters_of
+
+    out = []
+    for p in parameters_of(f.model) if f.model is not None else ():
+        value = f.parameters[p.name]
+        for k, (v, bar) in enumerate(zip(np.atleast_1d(value), _error_bar(f, p.name), strict=True)):
+            element = f"{p.name}[{k}]" if value.ndim else p.name
+            if p.valid.lower >= 0 and 0 < v < bar and element not in f.undetermined and p.name not in f.undetermined:
+                out.append((element, float(v), float(bar)))
     return out
 
 

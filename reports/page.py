@@ -22,17 +22,6 @@ if TYPE_CHECKING:
 
 View = dict[str, Any]
 
-LOSSES: dict[str, str] = {
-    "perceptual": "ranks fits as people do",
-    "log": "ln(1 + f cos θi)",
-    "low": "log, θo uniform (Löw)",
-    "bieron": "log, weighted cos θo",
-    "ngan": "(f \u2212 m) cos θi",
-    "cuberoot": "cube root of f cos θi",
-    "relative": "(f \u2212 m)/m",
-}
-"""The named losses in the order of the table, and what they compare."""
-
 MISSING = {
     "lobes": "lobe plots",
     "maps": "residual maps",
@@ -50,6 +39,7 @@ def page(fits: Sequence[Fit], evidence: Sequence[Evidence], environment: dict[st
     titles = _titles(list(groups))
     sections = [_section(k, titles[k], group, by_source.get(key)) for k, (key, group) in enumerate(groups.items())]
     failed = sum(not f.converged for f in fits)
+    graded = any(s["graded"] for s in sections)
     summary = f"{words.count(len(fits), 'fit')} of {words.count(len(groups), 'material')}"
     if failed:
         summary += f"; {words.count(failed, 'fit')} failed or did not converge"
@@ -62,7 +52,8 @@ def page(fits: Sequence[Fit], evidence: Sequence[Evidence], environment: dict[st
             {"words": text, "limit": None if math.isinf(limit) else f"≤ {limit:g}", "index": k}
             for k, (limit, text) in enumerate(words.GRADES)
         ],
-        "grades_note": words.GRADES_NOTE,
+        "graded": graded,
+        "grades_note": " ".join([words.ERROR_NOTE, *([words.GRADES_NOTE] if graded else [])]),
         "references": _references(fits, evidence),
         "environment": [(str(k), _shown(v)) for k, v in sorted(environment.items())],
     }
@@ -109,14 +100,19 @@ def _section(number: int, title: str, fits: list[Fit], evidence: Evidence | None
     drawn = [(rows[fit_key(f)], label) for f, label in ranked if _shows(f, rows)]
     channel_names = _channel_names(fits, evidence)
     salt = f"brdfit-{number}-"
+    reflectance = _reflectance(evidence)
+    ranking = [_rank(k + 1, f, label, words.no_word(f.measure, reflectance)) for k, (f, label) in enumerate(ranked)]
+    graded = any(r["grade"] is not None for r in ranking)
     return {
         "number": number,
         "material": title,
         "anchor": f"m{number}-" + (re.sub(r"[^A-Za-z0-9]+", "-", first.material).strip("-").lower() or "table"),
         "about": _about(fits),
-        "headline": _headline(title, ranked),
-        "ranking": [_rank(k + 1, f, label) for k, (f, label) in enumerate(ranked)],
-        "tradeoff": _tradeoff(ranked, salt),
+        "headline": _headline(title, ranked, reflectance),
+        "disagreement": _disagreement(evidence, drawn),
+        "ranking": ranking,
+        "graded": graded,
+        "tradeoff": _tradeoff(ranked, words.SEEN if graded else None, salt),
         "spheres": _spheres(evidence, drawn, first.material),
         "lobes": _lobes(evidence, drawn, first.material, salt),
         "channels": _channels(evidence, ranked, rows, channel_names, salt),
@@ -129,7 +125,9 @@ def _section(number: int, title: str, fits: list[Fit], evidence: Evidence | None
             for f, label in ranked
         ],
         "missing": _missing(evidence, [n for f, n in ranked if f.parameters and not _shows(f, rows)]),
-        "overview": {label: (perceptual(f), f.converged) for f, label in zip(fits, names, strict=True)},
+        "overview": {
+            label: (perceptual(f), f.converged, rank["grade"]) for (f, label), rank in zip(ranked, ranking, strict=True)
+        },
     }
 
 
@@ -159,20 +157,33 @@ def _about(fits: Sequence[Fit]) -> str:
     return text + (f", {words.thousands(beyond)} measured but beyond {f.max_angle:g}°." if beyond > 0 else ".")
 
 
-def _headline(material: str, ranked: Sequence[tuple[Fit, str]]) -> str:
+def _reflectance(evidence: Evidence | None) -> float:
+    """Mean share of the light that a material returns, by its table or else by its fits; NaN where nothing says it."""
+    if evidence is None or evidence.albedo is None:
+        return math.nan
+    part = evidence.albedo
+    for values in (part.measured[part.covered > 0.5], part.fitted):
+        if np.isfinite(values).any():
+            return float(np.nanmean(values))
+    return math.nan
+
+
+def _headline(material: str, ranked: Sequence[tuple[Fit, str]], reflectance: float) -> str:
     good = [(f, label) for f, label in ranked if math.isfinite(perceptual(f))]
     if not good:
         return f"No model could be fitted to {material}."
     best, label = good[0]
     error = perceptual(best)
     among = f"Best of {words.number(len(ranked))}" if len(ranked) > 1 else "The one fit"
-    text = f"{among} for {material}: {label}. Perceptual error {significant(error, 2)}: {words.grade(error)}."
+    why = words.no_word(best.measure, reflectance)
+    text = f"{among} for {material}: {label}. Perceptual error {significant(error, 2)}"
+    text += f" ({why})." if why else f": {words.grade(error)}."
     if not best.converged:
         text += " This fit did not converge."
     if len(good) > 1:
         second, other = good[1]
         text += f" Next is {other} with {significant(perceptual(second), 2)}"
-        good_enough = [g for g in good if perceptual(g[0]) <= words.SEEN and "solve" in g[0].seconds]
+        good_enough = [g for g in good if perceptual(g[0]) <= words.SEEN and "solve" in g[0].seconds and not why]
         if len(good_enough) > 1:
             fastest = min(good_enough, key=lambda g: g[0].seconds["solve"])
             text += (
@@ -186,25 +197,42 @@ def _headline(material: str, ranked: Sequence[tuple[Fit, str]]) -> str:
     return text
 
 
-def _rank(rank: int, f: Fit, label: str) -> View:
+JUST_SEEN = 1.0
+"""Mean CIEDE2000 by which spheres differ that look different at all."""
+
+
+def _disagreement(evidence: Evidence | None, drawn: Sequence[tuple[int, str]]) -> str:
+    """What to make of a sphere that another fit than the best one comes closest to; empty where they agree."""
+    if evidence is None or evidence.sphere is None or len(drawn) < 2:
+        return ""
+    off = {label: float(np.nanmean(d)) for m, label in drawn if np.isfinite(d := evidence.sphere.difference[m]).any()}
+    first, least = drawn[0][1], min(off, key=lambda n: off[n], default="")
+    if first not in off or off[first] - off[least] < JUST_SEEN:
+        return ""
+    return (
+        f"On the sphere below {least} comes closest to the material (mean CIEDE2000 {significant(off[least], 2)}; {first} "
+        f"{significant(off[first], 2)}): the ranking counts every pair of directions, the sphere one light from one side. "
+        "Where that is what will be seen, trust the sphere."
+    )
+
+
+def _rank(rank: int, f: Fit, label: str, why: str) -> View:
     error = perceptual(f)
+    words_of_it = why or words.grade(error)
     return {
         "rank": str(rank) if math.isfinite(error) else words.NONE,
         "label": label,
         "error": significant(error, 3),
-        "grade": words.grade_index(error),
-        "words": words.grade(error) if math.isfinite(error) else f"failed: {f.reason}",
+        "grade": None if why else words.grade_index(error),
+        "words": words_of_it if math.isfinite(error) else f"failed: {f.reason}",
         "numbers": sum(v.size for n, v in f.parameters.items() if n not in f.fixed) or words.NONE,
         "solve": words.seconds(f.seconds.get("solve", math.nan)),
-        "search": f.path if f.passes else words.NONE,
-        "passes": f.passes or words.NONE,
-        "compile": words.seconds(f.seconds.get("compile", math.nan)),
-        "converged": f.converged,
+        "doubt": math.isfinite(error) and not f.converged,
         "anchor": anchor(f, label),
     }
 
 
-def _tradeoff(ranked: Sequence[tuple[Fit, str]], salt: str) -> str | None:
+def _tradeoff(ranked: Sequence[tuple[Fit, str]], limit: float | None, salt: str) -> str | None:
     points = [
         (label, f.seconds["solve"], perceptual(f))
         for f, label in ranked
@@ -213,7 +241,7 @@ def _tradeoff(ranked: Sequence[tuple[Fit, str]], salt: str) -> str | None:
     if len(points) < 2:
         return None
     said = "; ".join(f"{label} {significant(e, 2)} in {words.seconds(t)}" for label, t, e in points)
-    return plots.tradeoff(points, words.SEEN, f"Perceptual error over the seconds of the solve: {said}", salt + "cost")
+    return plots.tradeoff(points, limit, f"Perceptual error over the seconds of the solve: {said}", salt + "cost")
 
 
 def _spheres(evidence: Evidence | None, drawn: Sequence[tuple[int, str]], material: str) -> View | None:
@@ -305,8 +333,11 @@ def _albedo(evidence: Evidence | None, drawn: Sequence[tuple[int, str]], first: 
 
 
 def _losses(fits: Sequence[Fit], names: Sequence[str]) -> View:
-    known = [n for n in LOSSES if any(n in f.errors for f in fits)]
-    known += sorted({n for f in fits for n in f.errors} - set(LOSSES))
+    from ..fitting import LOSSES
+
+    about = {n: LOSSES[n].meaning for n in ("perceptual", *LOSSES)}
+    known = [n for n in about if any(n in f.errors for f in fits)]
+    known += sorted({n for f in fits for n in f.errors} - set(about))
     table = []
     for name in known:
         values = [float(f.errors.get(name, math.nan)) for f in fits]
@@ -314,7 +345,7 @@ def _losses(fits: Sequence[Fit], names: Sequence[str]) -> View:
         best = min(finite) if finite else math.nan
         cells = [{"text": significant(v, 3), "best": v == best and len(finite) > 1} for v in values]
         table.append(
-            {"name": name, "about": LOSSES.get(name, ""), "cells": cells, "fitted": any(f.loss == name for f in fits)}
+            {"name": name, "about": about.get(name, ""), "cells": cells, "fitted": any(f.loss == name for f in fits)}
         )
     return {"names": list(names), "rows": table}
 
@@ -344,13 +375,13 @@ def _overview(sections: Sequence[View]) -> View:
         heads += [n for n in s["overview"] if n not in heads]
     rows = []
     for s in sections:
-        errors = {n: e for n, (e, _) in s["overview"].items() if math.isfinite(e)}
+        errors = {n: e for n, (e, _, _) in s["overview"].items() if math.isfinite(e)}
         best = min(errors, key=lambda n: errors[n]) if errors else None
         cells = []
         for n in heads:
-            error, converged = s["overview"].get(n, (math.nan, None))
+            error, converged, grade = s["overview"].get(n, (math.nan, None, None))
             text = significant(error, 2) if math.isfinite(error) else (words.NONE if converged is None else "failed")
-            cells.append({"text": text, "grade": words.grade_index(error), "best": n == best, "doubt": converged is False})
+            cells.append({"text": text, "grade": grade, "best": n == best, "doubt": converged is False})
         rows.append({"material": s["material"], "anchor": s["anchor"], "cells": cells, "best": best or "none"})
     wins = {n: sum(r["best"] == n for r in rows) for n in heads}
     best_line = ", ".join(f"{n} {c}" for n, c in sorted(wins.items(), key=lambda i: -i[1]) if c)
@@ -359,6 +390,8 @@ def _overview(sections: Sequence[View]) -> View:
 
 
 def _references(fits: Sequence[Fit], evidence: Sequence[Evidence]) -> list[View]:
+    from ..fitting import LOSSES
+
     uses: dict[str, list[str]] = {}
 
     def add(keys: Sequence[str], use: str) -> None:
@@ -369,13 +402,14 @@ def _references(fits: Sequence[Fit], evidence: Sequence[Evidence]) -> list[View]
     for f in fits:
         if f.model is not None:
             add(type(f.model).references, f"model {f.model_name}")
-        add(references.OF_LOSS.get(f.loss, ()), f"loss {f.loss}")
+        if f.loss in LOSSES and LOSSES[f.loss].source in references.REFERENCES:
+            add((LOSSES[f.loss].source,), f"loss {f.loss}")
         if f.source.endswith(".binary"):
             add(("merl",), "data")
         if physics.normal_reflectance(f.model) is not None:
             add(("hoffman2013",), "F0 of substances")
     if any(math.isfinite(perceptual(f)) for f in fits):
-        add(references.OF_LOSS["perceptual"], "ranking")
+        add((LOSSES["perceptual"].source,), "ranking")
     if any(f.parameters for f in fits):
         add(("optimistix", "jax"), "solver")
         add(("white1980",), "standard errors")

@@ -123,11 +123,11 @@ def normal_reflectance(model: BRDF | None) -> Reals | None:
     from ..models import channels
 
     with jax.enable_x64(True):
-        values = [_channel(model, c).normal_reflectance() for c in range(channels(model))]
+        values = [channel(model, c).normal_reflectance() for c in range(channels(model))]
     return None if values[0] is None else np.array(values, float)
 
 
-def _channel(model: BRDF, c: int) -> BRDF:
+def channel(model: BRDF, c: int) -> BRDF:
     """The model of one channel: every parameter a scalar."""
     import jax
 
@@ -185,7 +185,7 @@ def lobe_width(model: BRDF | None) -> Width | None:
         import jax
 
         with jax.enable_x64(True):
-            facets = model.parts.lobes[0].facets(_channel(model, 0))
+            facets = model.parts.lobes[0].facets(channel(model, 0))
             values = np.asarray(_program()(facets, np.sin(THETA_H) ** 2, np.cos(THETA_H) ** 2))
     else:
         values = evaluate(model, *directions(THETA_H, THETA_D, np.pi / 2), channels(model))[:, 0]

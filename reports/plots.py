@@ -358,8 +358,8 @@ def albedo(part: Albedo, fits: Sequence[tuple[int, str]], max_angle: float, alt:
         return as_svg(figure, alt)
 
 
-def tradeoff(points: Sequence[tuple[str, float, float]], limit: float, alt: str, salt: str) -> str:
-    """Error over the time of the solve; ``points`` are (label, seconds, error)."""
+def tradeoff(points: Sequence[tuple[str, float, float]], limit: float | None, alt: str, salt: str) -> str:
+    """Error over the time of the solve, with a line at ``limit``; ``points`` are (label, seconds, error)."""
     style = styles([p[0] for p in points])
     with styled(salt):
         figure, axes = new_figure(5.2, 3.0, (0.6, 0.1, 0.45, 0.1))
@@ -373,8 +373,10 @@ def tradeoff(points: Sequence[tuple[str, float, float]], limit: float, alt: str,
             ax.annotate(label, (time, error), xytext=(shift, 3), textcoords="offset points", ha=side, color="#222222")
         times, errors = np.array([p[1] for p in points]), np.array([p[2] for p in points])
         ax.set_xlim(times.min() / 4, times.max() * 3.2)
-        ax.set_ylim(min(errors.min(), limit) / 1.5, max(errors.max(), limit) * 1.6)
-        ax.axhline(limit, color="#555555", lw=0.8, ls=(0, (2, 2)))
+        shown = errors if limit is None else np.append(errors, limit)
+        ax.set_ylim(shown.min() / 1.5, shown.max() * 1.6)
+        if limit is not None:
+            ax.axhline(limit, color="#555555", lw=0.8, ls=(0, (2, 2)))
         log_ticks(ax)
         ax.set_xlabel("solve, seconds")
         ax.set_ylabel("perceptual error")

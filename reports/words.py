@@ -25,13 +25,28 @@ GRADES: tuple[tuple[float, str], ...] = (
 )
 """Upper limits and words. Only the first limit is measured; the others are steps of two chosen here."""
 
-GRADES_NOTE = (
+ERROR_NOTE = (
     "The perceptual error is the RMS difference of cbrt(f cos θi cos θo), weighted with cos θo. On 358 pairs of published "
-    "fits and materials judged by 1005 people it ranks fits about as they do (rank correlation .65). At 0.012 or less, "
-    "90 % of pairs are judged no farther from the material than near-exact approximations are: “hardly anyone sees a "
-    "difference”. That one limit is measured (with stand-ins for the materials); the words beyond it are steps of a factor "
-    "of two, chosen here."
+    "fits and materials judged by 1005 people it ranks fits about as they do (rank correlation .65)."
 )
+GRADES_NOTE = (
+    "At 0.012 or less, 90 % of pairs are judged no farther from the material than near-exact approximations are: “hardly "
+    "anyone sees a difference”. That one limit is measured (with stand-ins for the materials); the words beyond it are "
+    "steps of a factor of two, chosen here. They hold for cells that count by solid angle and materials that are not black."
+)
+
+BLACK = 1e-4
+"""Mean reflectance below which the limits say nothing: they are of absolute values, and no material judged was near it."""
+
+
+def no_word(measure: str, reflectance: float = math.nan) -> str:
+    """Why a perceptual error has no word here, empty where it has one; ``reflectance`` is NaN where it is not known."""
+    if measure != "solid_angle":
+        counted = "every cell counts once" if measure == "cells" else "a scene weights the cells"
+        return f"no word: {counted}, and what people see was measured with solid angles"
+    if reflectance < BLACK:
+        return f"no word: nearly black, {share(reflectance)} of the light is returned"
+    return ""
 
 
 def grade(error: float) -> str:

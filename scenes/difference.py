@@ -9,7 +9,7 @@ from __future__ import annotations
 import numpy as np
 from numpy.typing import NDArray
 
-from ..reports.colours import delta_e, encode, library, screen
+from ..reports.colours import delta_e, encode, library, luminance, screen
 from .pixels import View
 from .scene import Reals
 
@@ -37,7 +37,7 @@ def difference(measure: str, a: Reals, b: Reals, exposure: float, view: View) ->
     if measure == "psnr":
         return float(-10 * np.log10(max(((coded[0] - coded[1]) ** 2).mean(), 1e-30)))
     if measure == "ssim":
-        luma = [view.picture(c @ np.array([[0.2126], [0.7152], [0.0722]]))[..., 0] for c in coded]
+        luma = [view.picture(luminance(c)[:, None])[..., 0] for c in coded]
         return float(1 - ssim(*luma)[view.object].mean())
     raise ValueError(f"unknown measure {measure!r}")
 

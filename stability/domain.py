@@ -8,9 +8,9 @@ from dataclasses import dataclass, replace
 from typing import Any
 
 import numpy as np
-from jaxtyping import ArrayLike
 from numpy.typing import NDArray
 
+from ..angles import unit_vectors
 from ..models import Parameter
 
 Reals = NDArray[np.float64]
@@ -92,12 +92,6 @@ def ranges_of(parameters: Iterable[Parameter], owner: str) -> dict[str, Range]:
     return {p.name: range_of(p, owner) for p in parameters}
 
 
-def unit(theta: ArrayLike, phi: ArrayLike) -> Reals:
-    """Unit vectors of polar angle and azimuth in radians."""
-    theta, phi = np.broadcast_arrays(np.asarray(theta, float), np.asarray(phi, float))
-    return np.stack([np.sin(theta) * np.cos(phi), np.sin(theta) * np.sin(phi), np.sin(np.pi / 2 - theta)], -1)
-
-
 def draw_directions(rng: np.random.Generator, n: int) -> Reals:
     """``n`` pairs of directions, ``[n, 6]``: a sixth each any, mirror, retro, near-mirror, grazing, normal incidence."""
     kind = rng.integers(0, 6, n)
@@ -109,7 +103,7 @@ def draw_directions(rng: np.random.Generator, n: int) -> Reals:
     other = np.where((kind == 3) | (kind == 4), np.clip(theta + offset, 0, GRAZING), other)
     across = np.where((kind == 0) | (kind == 5), rng.uniform(0, 2 * np.pi, n), np.pi)
     across = np.where(kind == 2, 0, np.where(kind >= 3, across + turn, across))
-    return np.concatenate([unit(theta, phi), unit(other, phi + across)], -1)
+    return np.concatenate([unit_vectors(theta, phi), unit_vectors(other, phi + across)], -1)
 
 
 def draw(ranges: dict[str, Range], rng: np.random.Generator, n: int) -> Reals:
@@ -117,4 +111,4 @@ def draw(ranges: dict[str, Range], rng: np.random.Generator, n: int) -> Reals:
     return np.array([r.draw(rng, n) for r in ranges.values()]).reshape(len(ranges), n).T
 
 
-__all__ = ["CHANGES", "GRAZING", "NEAR", "Range", "draw", "draw_directions", "range_of", "ranges_of", "unit"]
+__all__ = ["CHANGES", "GRAZING", "NEAR", "Range", "draw", "draw_directions", "range_of", "ranges_of"]

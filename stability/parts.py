@@ -12,6 +12,7 @@ from jaxtyping import Array
 from numpy.typing import NDArray
 
 from .. import models, special
+from ..angles import unit_vectors
 from ..geometry import Geometry, from_sums
 from ..models import fresnel, masking, ndf, parameters_of
 from ..models.blocks import FRESNELS, MASKINGS, NDFS
@@ -101,7 +102,7 @@ class Part:
 def _aside(turn: float, viewer: float) -> Callable[[Reals], Reals]:
     """Pairs with the light at a polar angle, the viewer at ``viewer`` times it, ``turn`` away from the mirror direction."""
     return lambda t: np.concatenate(
-        [domain.unit(t, 0.3), domain.unit(np.minimum(t * viewer, GRAZING), 0.3 + np.pi - turn)], -1
+        [unit_vectors(t, 0.3), unit_vectors(np.minimum(t * viewer, GRAZING), 0.3 + np.pi - turn)], -1
     )
 
 
@@ -129,7 +130,7 @@ def _any_angle(rng: np.random.Generator, n: int) -> Reals:
 
 
 def _cosine(theta: Reals) -> Reals:
-    return domain.unit(theta, 0.3)[:, 2:]
+    return unit_vectors(theta, 0.3)[:, 2:]
 
 
 def _any_cosine(rng: np.random.Generator, n: int) -> Reals:
@@ -140,7 +141,7 @@ def _few_directions(rng: np.random.Generator, n: int) -> Reals:
     """Mirror, retro and other pairs of equal polar angles: one integral of masking each."""
     theta = rng.choice(POLAR, n)
     across = rng.choice([0, np.pi, np.pi + 1e-8, np.pi - 1e-3, 1.0, 2.5], n)
-    return np.concatenate([domain.unit(theta, 0.3), domain.unit(theta, 0.3 + across)], -1)
+    return np.concatenate([unit_vectors(theta, 0.3), unit_vectors(theta, 0.3 + across)], -1)
 
 
 def level(points: Reals) -> NDArray[np.bool_]:
@@ -307,7 +308,7 @@ def _smith(name: str) -> Part:
 def _masking(name: str) -> Part:
     """V of a block, where it depends on the distribution that of GGX."""
     block = MASKINGS[name]
-    of_ggx = block.needs_alpha or name.startswith("smith")
+    of_ggx = block.needs_alpha or block.integral
     ranges = _declared(NDFS["ggx"].parameters, "ggx") if of_ggx else {}
     kink = level if name in ("vcavity", "half_vector") else None
 

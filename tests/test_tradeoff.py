@@ -10,13 +10,13 @@ import jax.numpy as jnp
 import numpy as np
 import pytest
 from brdfit import cli, models
+from brdfit.angles import unit_vectors
 from brdfit.fitting import Effort
 from brdfit.geometry import from_directions
 from brdfit.models import ndf, parameter_values
 from brdfit.models.masking.smith import NODES, REACH, averted_area
 from brdfit.quadrature import smith_kernel
 from brdfit.stability import oracle
-from brdfit.stability.domain import unit
 from brdfit.tabulated import read, tabulate
 from brdfit.tradeoff import advice, approximations, page, rendering, sample, settings, smith, survey, timing
 from brdfit.tradeoff.evaluation import Evaluation, Operations, direct
@@ -35,7 +35,7 @@ MICROFACET = {
 
 def sampled(count=400, seed=0):
     rng = np.random.default_rng(seed)
-    wi, wo = (unit(rng.uniform(0, np.radians(79.9), count), rng.uniform(0, 2 * np.pi, count)) for _ in range(2))
+    wi, wo = (unit_vectors(rng.uniform(0, np.radians(79.9), count), rng.uniform(0, 2 * np.pi, count)) for _ in range(2))
     return sample.Sample(wi, wo, rng.uniform(0, 1, (count, 3)), 80.0)
 
 
@@ -111,7 +111,10 @@ def test_nothing_exchanged_is_the_model(name):
 def test_masking_never_adds_light(name):
     m, s = models.model(name, **MICROFACET[name]), sampled()
     with jax.enable_x64(True):
-        f = {k: np.asarray(exchanged(type(m), masking=v)(**parameter_values(m))(s.wi, s.wo)) for k, v in MASKINGS.items()}
+        f = {
+            k: np.asarray(exchanged(type(m), masking=v.visibility)(**parameter_values(m))(s.wi, s.wo))
+            for k, v in MASKINGS.items()
+        }
     for form in ("Smith, height-correlated", "Smith, separable", "V-cavity"):
         assert (f[form] <= f["none"] * (1 + 1e-12)).all()
         assert (f[form] < f["none"]).any()
@@ -124,7 +127,7 @@ def test_fresnel_terms_agree_at_normal_incidence_and_only_there(cls):
     one = jax.tree.map(lambda x: jnp.asarray(np.ravel(x)[0]), m)
     with jax.enable_x64(True):
         theta = np.radians([0.0, 60.0])
-        g = from_directions(unit(theta, 0.0), unit(theta, np.pi))
+        g = from_directions(unit_vectors(theta, 0.0), unit_vectors(theta, np.pi))
         own, other = (np.asarray(f(one, g)) for f in FRESNELS[cls].values())
     assert own[0] == pytest.approx(other[0], rel=1e-7)  # float32 in one of them would show
     assert abs(own[1] / other[1] - 1) > 1e-3

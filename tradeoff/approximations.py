@@ -92,7 +92,7 @@ def _forms(part: str, model: BRDF | None) -> dict[str, BRDF]:
     if part == "fresnel":
         return {form: exchanged(cls, fresnel=term)(**values) for form, term in FRESNELS[cls].items()}
     own = PARTS[cls].masking
-    return {form: exchanged(cls, masking=MASKINGS[form])(**values) for form in (own, COUNTERPART[own], "none")}
+    return {form: exchanged(cls, masking=MASKINGS[form].visibility)(**values) for form in (own, COUNTERPART[own], "none")}
 
 
 def _refitted(table: Table, start: BRDF, like: Fit) -> dict[str, float]:

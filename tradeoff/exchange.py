@@ -11,11 +11,10 @@ import jax.numpy as jnp
 from jaxtyping import Array, Float
 
 from ..geometry import Geometry
-from ..models import BRDF
+from ..models import BRDF, blocks
 from ..models.abc import ABC
 from ..models.fresnel import dielectric, dielectric_f0, schlick
 from ..models.gtr import GTR
-from ..models.masking import smith_correlated, smith_separable, vcavity
 from ..models.masking.smith import NDF
 from ..models.parts import Composition, Parts
 from ..models.sgd import SGD
@@ -34,22 +33,23 @@ class Own:
     masking: str
     """Key of :data:`MASKINGS`."""
 
-
-def _vcavity(lobe: NDF, g: Geometry) -> Field:
-    return vcavity(g)
+    @property
+    def integral(self) -> bool:
+        """Whether its masking is Smith's integral."""
+        return MASKINGS[self.masking].integral
 
 
 def _nothing(lobe: NDF, g: Geometry) -> Field:
     return 1 / (4 * g.cos_i * g.cos_o)
 
 
-MASKINGS: dict[str, Masking] = {
-    "Smith, height-correlated": smith_correlated,
-    "Smith, separable": smith_separable,
-    "V-cavity": _vcavity,
-    "none": _nothing,
+MASKINGS: dict[str, blocks.Masking] = {
+    "Smith, height-correlated": blocks.MASKINGS["smith"],
+    "Smith, separable": blocks.MASKINGS["smith_separable"],
+    "V-cavity": blocks.MASKINGS["vcavity"],
+    "none": blocks.Masking(_nothing, "G = 1", ()),
 }
-"""V = G / (4 n.l n.v) of a lobe."""
+"""The masking that a model may have."""
 
 PARTS: dict[type[BRDF], Own] = {
     cls: Own(cls.parts.lobes[0].reflectance, masking)

@@ -12,12 +12,9 @@ from jaxtyping import Array
 from ..fitting import Fit
 from ..tabulated import read, tabulate
 from .evaluation import Evaluation, Operations, direct
-from .exchange import MASKINGS, PARTS
+from .exchange import PARTS
 from .sample import Sample
 from .timing import Timing, interleaved
-
-Way = tuple[str, Callable[[Any, Array, Array], Array], Any]
-"""The masking, a function of what, wi and wo, and what."""
 
 REPEATS = 9
 BUDGET = 8.0
@@ -49,7 +46,8 @@ def renderings(fits: Sequence[Fit], sample: Sample) -> list[Rendering]:
     wide: dict[tuple[str, str], Evaluation] = {}
     of = {f.model_name: f for f in fits if f.model is not None}
     for name, fit in of.items():
-        integral = _smith(fit)
+        own = PARTS.get(type(fit.model))  # type: ignore[arg-type]
+        integral = own is not None and own.integral
         ways: list[tuple[str, Callable[[Any, Array, Array], Array], Any]] = [
             ("integral" if integral else "", direct, fit.model)
         ]
@@ -79,12 +77,6 @@ def renderings(fits: Sequence[Fit], sample: Sample) -> list[Rendering]:
             )
         )
     return out
-
-
-def _smith(fit: Fit) -> bool:
-    """Whether the model's masking is Smith's integral."""
-    parts = PARTS.get(type(fit.model))  # type: ignore[arg-type]
-    return parts is not None and MASKINGS[parts.masking].__name__.startswith("smith")
 
 
 __all__ = ["Rendering", "renderings"]

@@ -21,7 +21,7 @@ from ..models.masking.smith import NDF, NODES, REACH, Rule, smith_correlated, sm
 from ..quadrature import gauss_legendre, smith_kernel
 from ..tabulated import read, tabulate
 from .evaluation import Evaluation, direct
-from .exchange import MASKINGS, PARTS, Field, Masking, exchanged
+from .exchange import PARTS, Field, Masking, exchanged
 from .sample import Sample
 from .timing import Timing, interleaved
 
@@ -95,7 +95,7 @@ def quadratures(fits: Sequence[Fit], sample: Sample, losses: Sequence[str]) -> l
     reference: dict[str, Reals] = {}
     for fit in fits:
         m = fit.model
-        if m is None or type(m) not in PARTS or not MASKINGS[PARTS[type(m)].masking].__name__.startswith("smith"):
+        if m is None or type(m) not in PARTS or not PARTS[type(m)].integral:
             continue
         reference[fit.model_name] = Evaluation(direct, with_rule(m, "even in u", REFERENCE), few, "float64").values()
         for rule, counts in (("even in u", COUNTS), ("Gauss-Legendre in t", PLAIN_COUNTS)):

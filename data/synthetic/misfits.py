@@ -1,6 +1,7 @@
 """Materials that none of the five models can reproduce, as measured ones cannot be: what a fit leaves over is known.
 
-Each is a closed formula: GGX(alpha) stands for D G/(4 n.l n.v) of that distribution. All are reciprocal.
+Each is a closed formula: GGX(alpha) stands for D G/(4 n.l n.v) of that distribution. All are reciprocal. Their parts are the
+models' own, since no formula is tested against them: it is the sum that no model has.
 """
 
 from __future__ import annotations
@@ -14,8 +15,11 @@ from jaxtyping import Array, Float
 from ...geometry import Geometry
 from ...models.base import BRDF, NOT_NEGATIVE, POSITIVE, Interval, parameter
 from ...models.common import diffuse_parameter
-from ...models.diffuse import lambert
+from ...models.diffuse import lambert, oren_nayar
 from ...models.fresnel import dielectric, schlick
+from ...models.masking import smith_correlated
+from ...models.microfacet import microfacet
+from ...models.ndf import GGX
 
 
 def _each(meaning: str, valid: Interval = NOT_NEGATIVE) -> Any:
@@ -26,21 +30,10 @@ def _shared(meaning: str, valid: Interval = POSITIVE, unit: str = "1") -> Any:
     return parameter(meaning, valid=valid, unit=unit)
 
 
-def _rough_body(albedo: Float[Array, ""], sigma: Float[Array, ""], g: Geometry) -> Float[Array, "..."]:
-    """Oren & Nayar's qualitative model (1994), with cos(phi_i - phi_o) sin tan = s/max(cos_i, cos_o)."""
-    s2 = sigma * sigma
-    # l.v - cos_i cos_o = sin_i sin_o cos(phi_i - phi_o), and l.v = cos(2 theta_d)
-    s = 1 - 2 * g.sin2_d - g.cos_i * g.cos_o
-    towards_the_light = 0.45 * s2 / (s2 + 0.09) * jnp.maximum(s, 0) / jnp.maximum(g.cos_i, g.cos_o)
-    return albedo / jnp.pi * (1 - 0.5 * s2 / (s2 + 0.33) + towards_the_light)
-
-
 def _ggx(alpha: Float[Array, ""], fresnel: Float[Array, "..."], g: Geometry) -> Float[Array, "..."]:
     """F D G/(4 n.l n.v) with the GGX distribution and height-correlated masking (Walter et al. 2007; Heitz 2014)."""
-    a2 = alpha * alpha
-    d = a2 / (jnp.pi * (g.sin2_h + a2 * g.cos2_h) ** 2)
-    light, viewer = (jnp.sqrt(a2 + (1 - a2) * c * c) for c in (g.cos_i, g.cos_o))
-    return fresnel * d / (2 * (g.cos_i * viewer + g.cos_o * light))
+    lobe = GGX(alpha)
+    return microfacet(lobe(g.sin2_h, g.cos2_h), fresnel, smith_correlated(lobe, g))
 
 
 class TwoLobes(BRDF):
@@ -64,7 +57,7 @@ class TwoLobes(BRDF):
         """Value in 1/sr."""
         f = schlick(self.specular, g)
         lobes = _ggx(self.alpha, (1 - self.haze) * f, g) + _ggx(self.alpha_haze, self.haze * f, g)
-        return _rough_body(self.diffuse, self.sigma, g) + lobes
+        return oren_nayar(self.diffuse, self.sigma, g) + lobes
 
 
 class Retro(BRDF):
