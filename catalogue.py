@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+import re
 from collections.abc import Sequence
 from typing import Any
 
@@ -77,16 +78,19 @@ def _models(names: Sequence[str]) -> list[tuple[str, type[BRDF]]]:
     return [(name, cls) for name in names or MODELS for cls in variants(name)]
 
 
+def prose(doc: str) -> str:
+    """A docstring as running text, without the marks of code and cross-references."""
+    return re.sub(r":\w+:`[~.]*([^`]*)`|`+([^`]*)`+", r"\1\2", " ".join(doc.split()))
+
+
 def _wrapped(doc: str) -> list[str]:
-    import re
     import textwrap
 
-    plain = re.sub(r":\w+:`[~.]*([^`]*)`|`+([^`]*)`+", r"\1\2", " ".join(doc.split()))
-    return textwrap.wrap(plain, 110, initial_indent="    ", subsequent_indent="    ")
+    return textwrap.wrap(prose(doc), 110, initial_indent="    ", subsequent_indent="    ")
 
 
 def _end(x: float) -> float | None:
     return x if math.isfinite(x) else None
 
 
-__all__ = ["catalogue", "text"]
+__all__ = ["catalogue", "prose", "text"]

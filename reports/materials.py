@@ -47,7 +47,7 @@ GAP = (0.20, 0.45)
 """Between the brightest dielectrics and the darkest metals hardly any material lies (Hoffman gives 20-40 % and 20-45 %)."""
 
 NEAR = 0.1
-"""Difference from a substance beyond which it tells nothing: several listed ones are nearer to each other than twice this."""
+"""Difference from a substance beyond which none is named: some that are listed are nearer to each other."""
 
 COLOURED = 0.1
 """Spread of F0 over the channels, relative to its mean, that dispersion gives no dielectric (diamond: 4 %)."""

@@ -6,7 +6,9 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
-from brdfit.reports.gather import gather
+from brdfit.reports import words
+from brdfit.reports.evidence import Evidence, Published
+from brdfit.reports.gather import fit_key, gather
 from brdfit.reports.write import rebuild_report, write_fits, write_report
 
 from .report_cases import ENVIRONMENT, GGX, WARD, Reader, failed, fit_of, half_grid, table_of
@@ -17,6 +19,80 @@ def test_headline_names_the_best_and_what_its_error_means(report):
     assert "Best of three for stuff: gtr. Perceptual error 0.0012: hardly anyone sees a difference." in text
     assert "Next is ward with 0.033" in text
     assert "Failed or not converged: sgd." in text
+
+
+@pytest.mark.parametrize("changes", [{"measure": "cells"}, {"measure": "scene office"}])
+def test_no_word_for_an_error_that_was_measured_otherwise(tmp_path, changes):
+    fits = [fit_of("ward", WARD, 0.0333, **changes), fit_of("gtr", GGX, 0.00123, **changes)]
+    html = write_report(tmp_path, fits, [], {}).read_text()
+    text = Reader(html).text
+    assert "Perceptual error 0.0012 (no word:" in text
+    assert "Next is ward with 0.033." in text
+    assert not any(said in text for _, said in words.GRADES)
+    assert not re.search(r'class="[^"]*heat\d', html)
+
+
+def test_no_word_for_what_is_nearly_black(tmp_path, fits, evidence):
+    """Under a thousandth of the light every error is small and says nothing."""
+    shown = evidence.albedo
+    dark = replace(evidence, albedo=replace(shown, measured=shown.measured * 1e-4))
+    text = Reader(write_report(tmp_path, fits, [dark], {}).read_text()).text
+    assert re.search(r"Perceptual error 0.0012 \(no word: nearly black, 0.00\d+ % of the light is returned\)", text)
+    assert "Dashed" not in text
+
+
+def test_sphere_and_ranking_that_disagree_are_said(tmp_path, fits, evidence):
+    """The ranking has gtr before ward."""
+    off = evidence.sphere.difference.copy()
+    rows = {f.model_name: evidence.keys.index(fit_key(f)) for f in fits[:2]}
+    for ward, gtr, said in ((9.8, 13.0, True), (13.0, 9.8, False), (0.3, 0.4, False)):
+        off[rows["ward"]], off[rows["gtr"]] = ward, gtr
+        text = Reader(
+            write_report(
+                tmp_path, fits, [replace(evidence, sphere=replace(evidence.sphere, difference=off))], {}
+            ).read_text()
+        ).text
+        assert ("On the sphere below ward comes closest to the material (mean CIEDE2000 9.8; gtr 13)" in text) == said
+
+
+@pytest.mark.parametrize(
+    ("log", "perceptual", "said"), [(0.02, 0.02, True), (0.01, 0.02, False), (0.02, 0.04, False)], ids=str
+)
+def test_a_published_fit_that_wins_where_it_ranks_is_said(tmp_path, log, perceptual, said):
+    fit = fit_of("ward", WARD, 0.03)  # 0.015 by log
+    other = Published("someone", "ward1992", {"log": log, "perceptual": perceptual})
+    beside = Evidence("stuff", fit.source, fit.sha256, (fit_key(fit),), ("R", "G", "B"), published={fit_key(fit): other})
+    text = Reader(write_report(tmp_path, [fit], [beside], {}).read_text()).text
+    assert "beside the published fit" in text
+    assert ("fit by it: --loss perceptual" in text) == said
+
+
+def test_an_error_bar_beyond_its_value_is_said(tmp_path):
+    fit = fit_of("ward", WARD, 0.02)
+    fit.spread["specular"][1] = 1.2
+    fit.spread["alpha"] = np.asarray(0.19)
+    text = Reader(write_report(tmp_path, [fit], [], {}).read_text()).text
+    assert "Not determined by these data, with error bars beyond the values themselves: specular G (0.20 ± 1.2)." in text
+
+
+def test_the_form_limits_only_what_is_clear_of_the_noise(tmp_path):
+    alike = fit_of("ward", WARD, 0.02)
+    alike.spread.update({n: 1.5 * v for n, v in alike.stderr.items()})
+    text = Reader(write_report(tmp_path, [alike], [], {}).read_text()).text
+    assert "no sign that the form of the model limits these numbers" in text
+    assert "what limits these numbers is the form" not in text
+
+
+def test_marks_of_cross_references_are_no_text(tmp_path):
+    from brdfit.models import MODELS, build, parameters_of
+
+    cls = MODELS["ward"][1]
+    values = {p.name: np.asarray(p.default) for p in parameters_of(cls)}
+    fit = replace(fit_of("ward", WARD, 0.1), model=build(cls, values), parameters=values, stderr={}, spread={}, labels=())
+    text = Reader(write_report(tmp_path, [fit], [], {}).read_text()).text
+    assert ":class:" in cls.__doc__.split("\n\n")[0]
+    assert ":class:" not in text
+    assert "`" not in text
 
 
 def test_page_is_well_formed_and_self_contained(report):
@@ -51,7 +127,7 @@ def test_numbers_are_those_of_the_fit(report, fits):
     assert "0.0999" in text  # ngan error of ward
     # specular R of gtr: 0.95 with 0.0095 over angular bands and 0.000095 noise
     assert "0.9500 ± 9.5·10⁻⁵ noise ± 0.0095 bands" in text
-    assert "500 ms exact 10" in text  # solve, search, passes
+    assert "compile 1.00 s, solve 500 ms" in text
     assert "12 starts: nine reached" not in text
     assert "Twelve starts: nine reached the best optimum (log error 0.0006150), two reached 0.001230" in text
 

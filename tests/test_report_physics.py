@@ -9,6 +9,9 @@ from brdfit import references
 from brdfit.models import MODELS, build, parameters_of, variants
 from brdfit.reports import materials, physics, words
 from brdfit.reports.colours import delta_e, encode, exposure_of, screen
+from brdfit.reports.model_section import _f0_error, physics_view
+
+from .report_cases import GGX, fit_of
 
 
 def test_albedo_of_lambert_is_its_diffuse():
@@ -70,6 +73,39 @@ def test_copper_is_copper():
     assert "metals" in materials.kind_of([0.9, 0.9, 0.9])
     with pytest.raises(ValueError, match="linear RGB"):
         materials.nearest([0.5])
+
+
+@pytest.mark.parametrize(
+    ("specular", "spread", "said"),
+    [
+        ([0.95, 0.64, 0.54], 0.01, "copper"),
+        ([0.95, 0.64, 0.54], 0.2, "none named: F0 is known to ± 20.0 % only"),
+        ([0.185, 0.166, 0.145], 0.01, "none within 10 %"),  # a rough nickel: as low as diamond, but coloured
+    ],
+)
+def test_a_substance_is_named_where_it_means_something(specular, spread, said):
+    fit = fit_of("gtr", GGX | {"specular": specular}, 0.02)
+    fit.spread["specular"] = spread * np.array(specular)
+    f0 = physics_view(fit, "gtr", None, {})["f0"]
+    assert (f0["nearest"] or f0["why"]) == said
+
+
+def test_error_of_f0_follows_from_those_of_what_makes_it():
+    """F0 of abc is specular ((ior - 1)/(ior + 1))^2: a quarter more of the one may be undone by the other."""
+    values = {"diffuse": [0.1], "specular": [1.3], "b": 900.0, "c": 1.1, "ior": 2.0}
+    fit = fit_of("abc", values, 0.02)
+    # d ln F0 = d ln specular + 4/(ior^2 - 1) d ior
+    fit.spread.update({"specular": np.array([0.3 * 1.3]), "ior": np.asarray(0.3)})
+    k, m = fit.labels.index("specular[0]"), fit.labels.index("ior")
+    f0 = physics.normal_reflectance(fit.model)
+    for r in (0.0, -0.9):
+        fit.correlation[k, m] = fit.correlation[m, k] = r
+        assert _f0_error(fit, f0) == pytest.approx(np.sqrt(0.3**2 + 0.4**2 + 2 * r * 0.3 * 0.4), rel=1e-6)
+
+
+def test_a_coloured_dielectric_is_doubted():
+    assert "coloured as none is" in materials.kind_of([0.185, 0.166, 0.145])
+    assert materials.kind_of([0.171, 0.173, 0.177]) == "in the range of dielectrics"  # diamond, index 2.41 to 2.45
 
 
 def of(name, **parameters):
