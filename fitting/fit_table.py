@@ -131,14 +131,14 @@ def fit(
     Args:
         table: What was measured.
         model: A name of ``brdfit.models.MODELS``, a model class, or an instance, whose values are then one more start.
-        loss: A name of ``brdfit.losses.LOSSES`` or any JAX-traceable ``loss(predicted [n, C], measured [n, C], geometry)
+        loss: A name of ``brdfit.fitting.LOSSES`` or any JAX-traceable ``loss(predicted [n, C], measured [n, C], geometry)
             -> residual``; the sum of weight * residual^2 is minimised.
         measure: ``"solid_angle"``, a cell counts by its solid angles, or ``"cells"``, every cell counts once.
         max_angle: Largest polar angle of either direction, degrees, in (0, 90).
         fixed: Parameters to hold at given values, ``[]`` or ``[C]``.
         bounds: ``(lower, upper)`` in place of a parameter's default search box.
-        start: Parameters of one more start; those left out take their defaults. Or "published": the published fit of the
-            model to the material, by its name, if there is one.
+        start: Parameters of one more start; those left out are as in the first shape. Or "published": the published fit of
+            the model to the material, by its name, if there is one.
         anisotropic: Whether to fit the anisotropic form of a named model; by default if the table is anisotropic.
         seed: Seed of the starts of models that have no shapes of their own to start from.
         effort: Settings that trade time for accuracy.

@@ -17,16 +17,16 @@ from .fresnel import dielectric_at
 
 
 class ABCSmooth(BRDF):
-    """f = diffuse/pi + scale F_dielectric(ior, c) / (1 + b |D_p|^2)^c, D_p = l_xy + v_xy (Löw et al. 2012).
+    """f = diffuse/pi + scale F_dielectric(ior, cos_p) / (1 + b |D_p|^2)^c, D_p = l_xy + v_xy (Löw et al. 2012).
 
     Scatter by small heights is a function of the difference of projected directions, D_p, alone but for Fresnel. With
-    l_p = l_xy and the mirrored v_p = -v_xy, F is taken at cos^2 = 1 - |l_xy - v_xy|^2/4, the middle of the two projections
-    . |D_p| = 2 cos(theta_d) sin(theta_h) and |l_xy - v_xy|^2/4 = sin^2(theta_d) -
+    l_p = l_xy and the mirrored v_p = -v_xy, F is taken in the middle of the two projections, where the cosine is
+    cos_p = sqrt(1 - |l_xy - v_xy|^2/4). Here |D_p| = 2 cos(theta_d) sin(theta_h) and |l_xy - v_xy|^2/4 = sin^2(theta_d) -
     (n.l - n.v)^2/4, so that nothing cancels near the mirror direction and isotropic tables serve.
 
     Reciprocal; no form bounds the energy, and there is no masking: the albedo with the cosine falls towards grazing. Known
-    failures: scale, b and c trade off along a ridge for narrow lobes; ior and scale as for ``abc``; in float32
-    slopes between two grazing directions are good to 5e-4.
+    failures: scale, b and c trade off along a ridge for narrow lobes; ior and scale as for ``abc``; in float32 slopes
+    between two grazing directions are good to 5e-4.
     """
 
     name: ClassVar[str] = "abc_smooth"

@@ -38,8 +38,7 @@ class AshikhminShirley(BRDF):
     The survey's print of it (Schwenk 2011, eq. 41) has lost pi and the root over (e_x + 1)(e_y + 1). By integration the
     paper's form returns what falls on it, or less.
     Reciprocal; conserves energy for diffuse, specular <= 1 (tests/test_energy.py::test_ashikhmin_shirley_conserves_energy).
-    Known failure: on rough materials the best fit uses the lobe
-    (exponent -> 0) as body term.
+    Known failure: on rough materials the best fit uses the lobe (exponent -> 0) as body term.
     """
 
     name: ClassVar[str] = "ashikhmin_shirley"

@@ -1,4 +1,4 @@
-"""Blinn-Phong: a power of the cosine of the half vector, in its common scale and in the exact one."""
+"""Blinn-Phong: a power of the cosine of the half vector, in its common scale."""
 
 from __future__ import annotations
 

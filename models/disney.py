@@ -64,10 +64,9 @@ class Disney(BRDF):
     (Burley 2012, section 5, with the subsurface term and the constants of the implementation he published with it).
 
     f_d = (1 + (F90 - 1)(1 - n.l)^5)(1 + (F90 - 1)(1 - n.v)^5), F90 = 1/2 + 2 roughness c_d^2; f_s = 1.25 (f_ss (1/(n.l +
-    n.v) - 1/2) + 1/2), f_ss as f_d with F90 = roughness c_d^2. F = Schlick of mix(0.08 specular, base_color,
-    metallic), D_ggx of
-    alpha = max(0.001, roughness^2), V of GGX's separable masking with alpha = (1/2 + roughness/2)^2. F_c = Schlick of 0.04,
-    D_c = GTR of gamma = 1 and alpha = mix(0.1, 0.001, clearcoat_gloss), V_c with alpha = 0.25.
+    n.v) - 1/2) + 1/2), f_ss as f_d with F90 = roughness c_d^2. F = Schlick of mix(0.08 specular, base_color, metallic),
+    D_ggx of alpha = max(0.001, roughness^2), V of GGX's separable masking with alpha = (1/2 + roughness/2)^2. F_c =
+    Schlick of 0.04, D_c = GTR of gamma = 1 and alpha = mix(0.1, 0.001, clearcoat_gloss), V_c with alpha = 0.25.
 
     Deviations: a channel knows nothing of the others, so the tints, which mix white with base_color over its luminance, are
     not parameters: specular and sheen are colours, the scale and the tint in one. Of max(0.001, roughness^2) the
@@ -102,9 +101,9 @@ class Disney(BRDF):
 
 
 class DisneyAnisotropic(BRDF):
-    """As :class:`Disney` with D = 1/(pi a_x a_y (h_x^2/a_x^2 + h_y^2/a_y^2 + (n.h)^2)^2), a_x = max(0.001,
-    roughness^2/aspect),
-    a_y = max(0.001, roughness^2 aspect), aspect = sqrt(1 - 0.9 anisotropic) (Burley 2012, section 5.4 and appendix B.2).
+    """As :class:`Disney` with D = 1/(pi a_x a_y (h_x^2/a_x^2 + h_y^2/a_y^2 + (n.h)^2)^2),
+    a_x = max(0.001, roughness^2/aspect), a_y = max(0.001, roughness^2 aspect), aspect = sqrt(1 - 0.9 anisotropy)
+    (Burley 2012, section 5.4 and appendix B.2).
     """
 
     name: ClassVar[str] = "disney"

@@ -40,8 +40,7 @@ class MissingEnergy(eqx.Module):
     interpolated by Chebyshev polynomials in x = (1 - 2 psi/pi)^1/2: it stays near 1 however narrow the lobe is, and psi
     follows the layer near grazing where facets hide each other.
 
-    Absolute error of 1 - E for GGX: 4e-4 for alpha >= 0.05, below that 1e-3
-    (tests/test_effects.py::test_white_furnace).
+    Absolute error of 1 - E for GGX: 4e-4 for alpha >= 0.05, below that 1e-3 (tests/test_effects.py::test_white_furnace).
     """
 
     coefficients: Float[Array, " ANGLES"]
