@@ -9,7 +9,7 @@ import numpy as np
 
 from ..angles import half_difference
 from ..environment import environment
-from ..files import StrPath
+from ..files import StrPath, plain
 from ..models import parameter_values
 from ..models.effects import EFFECTS
 from ..reports.beside import write_beside
@@ -73,7 +73,7 @@ def document(study: Study, where: dict[str, Any]) -> dict[str, Any]:
             {"effect": v.effect, "called_for": v.called, "because": because(study, v), "other": v.other and _brief(v.other)}
             for v in choice.verdicts
         ],
-        "tried": [{"effects": list(t.effects), "fit_error": _number(t.fit_error)} for t in choice.tried],
+        "tried": [{"effects": list(t.effects), "fit_error": plain(t.fit_error)} for t in choice.tried],
         "filled": study.filled,
         "noise": None
         if study.reference.noise is None
@@ -84,26 +84,22 @@ def document(study: Study, where: dict[str, Any]) -> dict[str, Any]:
 
 def _record(study: Study, t: Tried, key: str) -> dict[str, Any]:
     values = study.pictures[key].values
-    errors = {m: _number(difference(m, values, study.reference.values, study.exposure, study.view)) for m in MEASURES}
+    errors = {m: plain(difference(m, values, study.reference.values, study.exposure, study.view)) for m in MEASURES}
     named = {n: v.tolist() for n, v in parameter_values(t.model).items()}
     return _timed(t) | {"errors": errors, "model": t.model.name, "parameters": named}
 
 
 def _brief(t: Tried) -> dict[str, Any]:
-    return {"effects": list(t.effects), "error": _number(t.error)}
+    return {"effects": list(t.effects), "error": plain(t.error)}
 
 
 def _timed(t: Tried) -> dict[str, Any]:
     work = t.operations
     return _brief(t) | {
         "nanoseconds": t.nanoseconds,
-        "flops": _number(work.flops),
-        "transcendentals": _number(work.transcendentals),
+        "flops": plain(work.flops),
+        "transcendentals": plain(work.transcendentals),
     }
-
-
-def _number(x: float) -> float | None:
-    return float(x) if np.isfinite(x) else None
 
 
 def summary(study: Study) -> str:

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import base64
 import io
 from collections.abc import Sequence
 from typing import Any
@@ -10,7 +9,7 @@ from typing import Any
 import numpy as np
 
 from ..reports.colours import encode, screen
-from ..reports.plots import as_svg, new_figure, styled
+from ..reports.plots import as_svg, data_uri, log_ticks, new_figure, png_uri, styled
 from ..tables import HalfDifferenceGrid
 from .choose import Tried
 from .pixels import View
@@ -64,7 +63,7 @@ def ladder(rungs: Sequence[Tried], everything: Tried, tolerance: Tolerance, alt:
         ax.axhline(tolerance.limit, color="#555555", lw=0.8, ls=(0, (2, 2)))
         ax.annotate("tolerance", (1, tolerance.limit), xycoords=("axes fraction", "data"), xytext=(-2, 3),
                     textcoords="offset points", ha="right", color="#555555")  # fmt: skip
-        _ticks(ax)
+        log_ticks(ax)
         low, high = ax.get_xlim()
         ax.set_xlim(low, high * 1.6)
         ax.set_xlabel("float32, nanoseconds a direction")
@@ -95,7 +94,7 @@ def scene_map(cells: Reals, grid: HalfDifferenceGrid, alt: str) -> str:
         bar.set_ticks([top * 1e-4, top * 1e-2, top], labels=["10$^{-4}$", "10$^{-2}$", "most"])
         out = io.BytesIO()
         figure.savefig(out, format="png", dpi=180)
-    return f'<img src="{_uri(out.getvalue())}" alt="{alt}">'
+    return f'<img src="{data_uri(out.getvalue())}" alt="{alt}">'
 
 
 def _coarser(edges: Reals, most: int) -> Any:
@@ -103,26 +102,8 @@ def _coarser(edges: Reals, most: int) -> Any:
     return np.append(np.arange(0, n, -(-n // most)), n)
 
 
-def _ticks(ax: Any) -> None:
-    from matplotlib.ticker import FuncFormatter, LogLocator, NullFormatter
-
-    for axis in (ax.xaxis, ax.yaxis):
-        if axis.get_scale() == "log":
-            axis.set_major_locator(LogLocator(subs=(1, 2, 5)))
-            axis.set_major_formatter(FuncFormatter(lambda v, _: f"{v:g}"))
-            axis.set_minor_formatter(NullFormatter())
-
-
 def _png(colours: Reals) -> str:
-    from PIL import Image
-
-    out = io.BytesIO()
-    Image.fromarray((np.clip(colours, 0, 1) * 255 + 0.5).astype(np.uint8)).save(out, "png", optimize=True)
-    return _uri(out.getvalue())
-
-
-def _uri(png: bytes) -> str:
-    return "data:image/png;base64," + base64.b64encode(png).decode()
+    return png_uri((np.clip(colours, 0, 1) * 255 + 0.5).astype(np.uint8))
 
 
 __all__ = ["difference_map", "ladder", "picture", "scale", "scene_map"]
