@@ -16,7 +16,7 @@ from jaxtyping import Array, ArrayLike, Float
 
 from .geometry import Geometry, from_directions
 from .models import BRDF, parameters_of
-from .models.base import channel_axes, channels
+from .models.base import channel_axes, channels, in_session
 from .polar import PolarStencil, PolarTables
 from .programs import program
 
@@ -31,13 +31,15 @@ class Tabulated(NamedTuple):
 
 def tabulate(model: BRDF) -> Tabulated:
     """Make the tables of polar functions that a model asks for, in float64; none if it asks for none."""
-    with jax.enable_x64(True):
-        made = [np.asarray(t) for t in _tables(jax.tree.map(np.asarray, model))]
-    # NumPy's, as a fit's parameters are: where JAX works in float32 they follow
+    if any(isinstance(x, jax.core.Tracer) for x in jax.tree.leaves(model)):  # derivatives by parameters, say
+        made = _tables(model)
+    else:
+        with jax.enable_x64(True):
+            # NumPy's, as a fit's parameters are: where JAX works in float32 they follow
+            made = [np.asarray(t) for t in _stored_tables(jax.tree.map(np.asarray, model))]
     return Tabulated(model, made if _own_lobes(model) else [t[0] for t in made])
 
 
-@program
 def _tables(model: BRDF) -> list[Array]:
     one = jnp.ones(1)
     at = PolarStencil.to_horizon(one, 0 * one)
@@ -50,6 +52,9 @@ def _tables(model: BRDF) -> list[Array]:
 
     made: list[Array] = jax.vmap(make, in_axes=(channel_axes(model),), axis_size=channels(model))(model)
     return made
+
+
+_stored_tables = program(_tables)
 
 
 def read(what: Tabulated, wi: Array, wo: Array) -> Float[Array, "... C"]:
@@ -75,15 +80,19 @@ class Ready(eqx.Module):
 
     what: Tabulated
 
+    __hash__ = object.__hash__
+    __eq__ = object.__eq__
+
     def __call__(self, wi: ArrayLike, wo: ArrayLike) -> Float[Array, "... C"]:
         """BRDF in 1/sr at unit vectors ``[..., 3]``; 0 below the horizon."""
         wi, wo = jnp.broadcast_arrays(jnp.asarray(wi), jnp.asarray(wo))
+        what = jax.tree.map(in_session, self.what)
         above = (wi[..., 2] > 0) & (wo[..., 2] > 0)
         # Guard: below the horizon there is no polar angle to look up, and models divide by the cosines
         # (tests/test_tabulated.py::test_below_the_horizon).
         normal = jnp.zeros(3, wi.dtype).at[2].set(1)
         wi, wo = (jnp.where(above[..., None], w, normal) for w in (wi, wo))
-        return jnp.where(above[..., None], read(self.what, wi, wo), 0)
+        return jnp.where(above[..., None], read(what, wi, wo), 0)
 
 
 def ready(brdf: Any) -> Any:

@@ -118,6 +118,10 @@ class BRDF(eqx.Module):
     def evaluate(self, g: Geometry) -> Float[Array, "..."]:
         """BRDF in 1/sr for directions above the horizon, with every parameter a scalar (one channel at a time)."""
 
+    # ``jax.jit(model)`` asks for a hash, which arrays do not have (tests/test_models.py::test_a_model_is_a_function).
+    __hash__ = object.__hash__
+    __eq__ = object.__eq__
+
     def __call__(self, wi: ArrayLike, wo: ArrayLike) -> Float[Array, "... C"]:
         """BRDF in 1/sr, ``[..., C]``, for unit vectors ``[..., 3]`` to the light and the viewer.
 
@@ -129,9 +133,19 @@ class BRDF(eqx.Module):
         # in the gradient (tests/test_models.py::test_finite).
         normal = jnp.zeros(3, wi.dtype).at[2].set(1)
         wi, wo = (jnp.where(above[..., None], w, normal) for w in (wi, wo))
-        single = jnp.result_type(wi, *jax.tree.leaves(self)) == jnp.float32
-        values = _single_precision(self, wi, wo) if single else evaluate_channels(self, from_directions(wi, wo))
+        model = jax.tree.map(in_session, self)
+        single = jnp.result_type(wi, *jax.tree.leaves(model)) == jnp.float32
+        values = _single_precision(model, wi, wo) if single else evaluate_channels(model, from_directions(wi, wo))
         return jnp.where(above[..., None], values, 0)
+
+
+def in_session(x: ArrayLike) -> Array:
+    """An array in the precision that JAX works in; a fit's parameters are NumPy's, in float64.
+
+    Guard: NumPy narrows them, not JAX: a constant that JAX once narrowed in a compiled function it would take narrow
+    ever after, in float64, too (tests/test_models.py::test_a_model_is_a_function).
+    """
+    return jnp.asarray(x.astype(jax.dtypes.canonicalize_dtype(x.dtype)) if isinstance(x, np.ndarray) else x)
 
 
 def channel_axes(model: BRDF, channel: Any = 0, shared: Any = None) -> BRDF:

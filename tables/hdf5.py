@@ -82,9 +82,7 @@ def write_hdf5(path: StrPath, values: Table, *, truth: Mapping[str, Any] | None 
     Raises InputError if the file cannot be written and for a table weighted by a scene; nothing is left behind.
     """
     if type(values.layout) not in _KINDS.values():
-        raise InputError(
-            f"{path}: the format keeps no weights of a scene; save the table itself, and weight it when read"
-        )
+        raise InputError(f"{path}: the format keeps no weights of a scene; save the table itself, and weight it when read")
     with replacing(path) as temporary:
         temporary.write_bytes(_image(values, truth))
 
@@ -164,7 +162,10 @@ def _read_layout(path: StrPath, file: h5py.File) -> Layout:
         _check_scattered(path, **found)
     else:
         _check_axes(path, found)
-    return cls(**found)
+    try:
+        return cls(**found)
+    except ValueError as fault:
+        raise _odd(path, str(fault)) from None
 
 
 def _check_scattered(

@@ -138,12 +138,26 @@ class SphericalGrid:
 
 @dataclass(frozen=True, eq=False)
 class Scattered:
-    """Samples at directions of their own: unit vectors ``[n, 3]`` and the measure ``[n]`` each stands for, in sr^2."""
+    """Samples at directions of their own: unit vectors ``[n, 3]`` and the measure ``[n]`` each stands for, in sr^2.
+
+    :func:`brdfit.measurements` makes a table of them. Raises ValueError if a vector is no unit vector, to 1e-6, or a
+    measure is negative, not finite, or 0 throughout.
+    """
 
     wi: Reals
     wo: Reals
     measure: Reals
     isotropic: bool = False
+
+    def __post_init__(self) -> None:
+        """Check what a fit takes for granted."""
+        n = len(self.wi)
+        for name, w in (("wi", self.wi), ("wo", self.wo)):
+            if w.shape != (n, 3) or not (np.abs(np.einsum("nk,nk->n", w, w) - 1) <= 2e-6).all():
+                raise ValueError(f"{name} must be {n} unit vectors of shape ({n}, 3)")
+        m = self.measure
+        if m.shape != (n,) or not (np.isfinite(m) & (m >= 0)).all() or (n > 0 and not m.any()):
+            raise ValueError(f"measure must be {n} finite numbers, not negative and not all 0")
 
     @property
     def shape(self) -> tuple[int, ...]:

@@ -45,8 +45,6 @@ def measurements(
         raise ValueError(f"{material}: values must have shape [n] or [n, C], not {values.shape}")
     count = planes.shape[1]
     share = np.ones(count) if measure is None else np.asarray(measure, float)
-    if share.shape != (count,) or not (np.isfinite(share) & (share >= 0)).all() or not share.any():
-        raise ValueError(f"{material}: measure must be {count} finite numbers, not negative and not all 0")
     if channel_names and len(channel_names) != len(planes):
         raise ValueError(f"{material}: {len(channel_names)} channel names for {len(planes)} channels")
     to_light, to_viewer = _unit_vectors(f"{material}: wi", wi, count), _unit_vectors(f"{material}: wo", wo, count)

@@ -34,6 +34,9 @@ Shape = tuple[int, int, int]
 SCALE = np.array([1.0, 1.15, 1.66]) / 1500
 """1/sr per stored unit, of R, G and B."""
 
+LARGEST = 1e20
+"""1/sr beyond which a value is no measurement: the peak of a perfect lobe of 1e-10 radians."""
+
 _HEADER = struct.Struct("<3i")
 _LONGEST_AXIS = 10_000
 """Beyond any table that could be measured (a hundredth of a degree in theta_d)."""
@@ -62,7 +65,15 @@ def read_merl(path: StrPath, *, angles: Angles = "edge", phi_period: Period | No
     digest = hashlib.sha256(header)
     digest.update(content)
     planes = stored.astype(np.float64, copy=False)
-    planes *= SCALE[:, None, None, None]
+    with np.errstate(over="ignore", invalid="ignore"):  # of what is no number, and of what is none of a reflectance
+        planes *= SCALE[:, None, None, None]
+        largest = float(np.fmax.reduce(planes, axis=None))
+    if largest == np.inf:
+        largest = float(planes[np.isfinite(planes)].max(initial=0.0))
+    if largest > LARGEST:
+        raise InputError(
+            f"{path}: holds values up to {largest:.0e}/sr, which is no reflectance; check its byte order and units"
+        )
     material = Path(path).stem
     return table(planes, layout, material, source=os.fspath(path), sha256=digest.hexdigest(), angles=angles)
 

@@ -103,6 +103,18 @@ def test_what_is_not_measured_is_masked(tmp_path):
     assert found.planes[0, 2, 3, 4] == 0
 
 
+@pytest.mark.parametrize("order", [">f8", "<f8"])
+def test_values_that_are_no_reflectance_are_refused(tmp_path, order):
+    """Doubles of the other byte order have any exponent."""
+    path = packed(tmp_path / "a.binary")
+    raw = bytearray(path.read_bytes())
+    values = np.random.default_rng(0).lognormal(size=(len(raw) - 12) // 8) * (1.0 if order == ">f8" else 1e30)
+    raw[12:] = values.astype(order).tobytes()
+    path.write_bytes(raw)
+    with pytest.raises(brdfit.InputError, match=r"a\.binary: values up to .*/sr are no reflectance; check its byte order"):
+        brdfit.load(path)
+
+
 @pytest.mark.parametrize("angles", ["edge", "centre"])
 def test_round_trip(tmp_path, angles):
     values = planes()

@@ -6,6 +6,7 @@ import inspect
 from functools import cache
 from typing import Any
 
+import brdfit
 import jax
 import jax.numpy as jnp
 import numpy as np
@@ -277,3 +278,23 @@ def test_lobes_of_lafortune():
         np.testing.assert_array_equal(four(WI, WO), models.model("lafortune2", **scales, **shapes)(WI, WO))
     with pytest.raises(ValueError, match="Lafortune's model has at least one lobe, not 0"):
         lobes(0)
+
+
+def test_a_model_is_a_function():
+    """``jax.jit``, ``jax.vmap`` and ``jax.grad`` take it as it is, ready or not; in float32, and later in float64."""
+    model = brdfit.model("gtr", diffuse=0.1, specular=[0.2, 0.3], alpha=0.2, gamma=1.5)
+    wi, wo = jnp.array([0.6, 0, 0.8]), jnp.array([0, 0.6, 0.8])
+    value = np.asarray(model(wi, wo))
+    # rounding of float32 through a dozen operations; 2e-6 more from a table
+    np.testing.assert_allclose(jax.jit(model)(wi, wo), value, rtol=1e-6)
+    ready = brdfit.ready(model)
+    for f in (ready, jax.jit(ready)):
+        np.testing.assert_allclose(f(wi, wo), value, rtol=4e-6)
+    np.testing.assert_allclose(jax.vmap(model, (0, None))(jnp.stack([wi, wo]), wo)[0], value, rtol=1e-6)
+    own = jax.grad(lambda m: m(wi, wo).sum())(model)
+    read = jax.grad(lambda m: brdfit.ready(m)(wi, wo).sum())(model)
+    for a, b in zip(jax.tree.leaves(own), jax.tree.leaves(read), strict=True):
+        np.testing.assert_allclose(a, b, rtol=1e-4)
+    assert len(jax.tree.leaves(jax.grad(lambda r: r(wi, wo).sum())(ready))) == 5
+    with jax.enable_x64(True):
+        np.testing.assert_allclose(jax.jit(model)(np.asarray(wi, float), np.asarray(wo, float)), value, rtol=1e-6)

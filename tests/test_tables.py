@@ -202,3 +202,15 @@ def test_measurements_that_do_not_agree(wrong, says):
     given = {"wi": UP, "wo": UP, "values": np.ones(4)} | wrong
     with pytest.raises(ValueError, match=says):
         measurements(given.pop("wi"), given.pop("wo"), given.pop("values"), **given)
+
+
+@pytest.mark.parametrize("measure", [np.zeros(4), -np.ones(4), np.array([1, 1, np.nan, 1]), np.ones(3)])
+def test_scattered_samples_count_for_what_they_say(measure):
+    with pytest.raises(ValueError, match="measure must be 4"):
+        Scattered(UP, UP, measure)
+
+
+def test_scattered_directions_are_unit_vectors():
+    for wrong in (2 * UP, UP[:2], UP * np.nan):
+        with pytest.raises(ValueError, match="wo must be 4 unit vectors"):
+            Scattered(UP, wrong, np.ones(4))
