@@ -229,7 +229,7 @@ def _remarks(f: Fit, channel_names: tuple[str, ...]) -> list[View]:
         say(f"not determined by the data: {names(f.undetermined)}. Other values do about as well.", True)
     vague = _vague(f)
     if vague:
-        shown = names(f"{e} ({significant(v, 2)} ± {significant(bar, 2)})" for e, v, bar in vague)
+        shown = names(f"{e} ({words.uncertain(v, bar)} ± {significant(bar, 2)})" for e, v, bar in vague)
         say(f"not determined by these data, with error bars beyond the values themselves: {shown}.", True)
     if f.fixed:
         say(f"held fixed: {names(f.fixed)}.")
@@ -259,8 +259,8 @@ def _remarks(f: Fit, channel_names: tuple[str, ...]) -> list[View]:
     misfit = [n for n, g in governing.items() if g == "spread"]
     if misfit and len(misfit) == len(governing):
         say(
-            "for every parameter the spread over angular bands exceeds the noise: what limits these numbers is the form "
-            "of the model, not the measurement."
+            "for every parameter the spread over angular bands is at least twice the noise: what limits these numbers is "
+            "the form of the model, not the measurement."
         )
     elif misfit:
         say(f"the form of the model, not noise, limits {words.listed(misfit)}.")

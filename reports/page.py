@@ -211,7 +211,7 @@ def _disagreement(evidence: Evidence | None, drawn: Sequence[tuple[int, str]]) -
         return ""
     return (
         f"On the sphere below {least} comes closest to the material (mean CIEDE2000 {significant(off[least], 2)}; {first} "
-        f"{significant(off[first], 2)}): the ranking counts every pair of directions, the sphere one light from one side. "
+        f"{significant(off[first], 2)}): the ranking and its words count every pair of directions, the sphere one light. "
         "Where that is what will be seen, trust the sphere."
     )
 
