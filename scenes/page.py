@@ -10,7 +10,7 @@ import numpy as np
 from ..angles import half_difference
 from ..environment import environment
 from ..files import StrPath, plain
-from ..models import parameter_values
+from ..models import BRDF, parameter_values, parameters_of
 from ..models.effects import EFFECTS
 from ..reports.beside import write_beside
 from ..reports.words import listed, minus, percent, seconds, significant, thousands
@@ -228,15 +228,27 @@ def _context(study: Study, where: dict[str, Any]) -> dict[str, Any]:
         "angles": _angles(study),
         "filled": percent(study.filled) if study.filled > 5e-4 else "",
         "noise": "" if noise is None else percent(float(noise.mean() / study.reference.values.mean())),
-        "parameters": [
-            (n, " ".join(significant(x, 4) for x in np.atleast_1d(v)))
-            for n, v in parameter_values(choice.chosen.model).items()
-        ],
+        "parameters": _parameters(choice.chosen.model),
         "pixels": thousands(len(view.wo)),
         "size": minus(f"{scene.camera.pixels[0]} \u00d7 {scene.camera.pixels[1]}"),
         "tried": len(choice.tried),
         "seconds": seconds(study.seconds),
     }
+
+
+ROUNDING = 1e-12
+"""What is less of the largest scale of a part, or of 1 where a parameter is no scale, is what rounding left of 0."""
+
+
+def _parameters(model: BRDF) -> list[tuple[str, str]]:
+    """Names and values as they are printed; 0 for what is only rounding, where 0 is in the range."""
+    values = {n: np.atleast_1d(v) for n, v in parameter_values(model).items()}
+    largest = max((float(np.abs(values[p.name]).max()) for p in parameters_of(model) if p.linear), default=1.0)
+    out = []
+    for p in parameters_of(model):
+        floor = ROUNDING * (largest if p.linear else 1.0) if 0.0 in p.valid else 0.0
+        out.append((p.name, " ".join(significant(x if abs(x) > floor else 0.0, 4) for x in values[p.name])))
+    return out
 
 
 def _said(study: Study, v: Verdict) -> dict[str, str]:
@@ -255,14 +267,15 @@ def _row(t: Tried, before: tuple[str, ...] | None) -> dict[str, str]:
 
 
 def _angles(study: Study) -> str:
-    """The middle half of what is seen, in words."""
+    """Where nine tenths of what is seen come from, in words."""
     h, d, _, _ = half_difference(study.seen.wi, study.seen.wo)
     said = []
     for name, x in (("θh", h), ("θd", d)):
         order = np.argsort(x)
         steps = np.cumsum(study.seen.weight[order])
         low, high = (np.degrees(x[order][np.searchsorted(steps, q * steps[-1])]) for q in (0.05, 0.95))
-        said.append(f"{name} from {significant(low, 2)} to {significant(high, 2)} degrees")
+        ends = [significant(x, 2) for x in (low, high)]
+        said.append(f"{name} {f'at {ends[0]}' if ends[0] == ends[1] else f'from {ends[0]} to {ends[1]}'} degrees")
     return " and ".join(said)
 
 

@@ -1,10 +1,15 @@
 """brdfit scene from the command to its files, on a small table and with two effects to choose from."""
 
 import json
+from types import SimpleNamespace
 
+import brdfit
+import numpy as np
 import pytest
+from brdfit.angles import directions
 from brdfit.cli import run
 from brdfit.models.effects import EFFECTS
+from brdfit.scenes import page
 
 from .report_cases import Reader
 
@@ -79,3 +84,18 @@ def test_fit_under_a_scene(tmp_path, small_file):
     found = json.loads((tmp_path / "fits.json").read_text())["fits"][0]
     assert found["measure"] == "scene mine"
     assert run([*arguments, "--measure", "cells"]) == 2
+
+
+def test_rounding_is_printed_as_zero():
+    small = brdfit.model("gtr", diffuse=[6.8e-16, 0.2, 1e-9], specular=[1e-14, 0.3, 0.5], alpha=1e-13, gamma=2.0)
+    shown = dict(page._parameters(small))
+    assert shown["diffuse"] == "0 0.2000 1.000·10⁻⁹"
+    assert shown["specular"] == "0 0.3000 0.5000"
+    assert shown["alpha"] == "1.000·10⁻¹³"  # there is no lobe of width 0
+
+
+def test_one_angle_is_no_range():
+    turn = np.radians([[1.0, 8.9], [2.0, 8.9], [3.0, 8.9]])
+    wi, wo = directions(turn[:, 0], turn[:, 1], np.radians(90.0))
+    study = SimpleNamespace(seen=SimpleNamespace(wi=wi, wo=wo, weight=np.ones(3)))
+    assert page._angles(study) == "θh from 1.0 to 3.0 degrees and θd at 8.9 degrees"
