@@ -71,9 +71,7 @@ def read_merl(path: StrPath, *, angles: Angles = "edge", phi_period: Period | No
     if largest == np.inf:
         largest = float(planes[np.isfinite(planes)].max(initial=0.0))
     if largest > LARGEST:
-        raise InputError(
-            f"{path}: holds values up to {largest:.0e}/sr, which is no reflectance; check its byte order and units"
-        )
+        raise InputError(f"{path}: values up to {largest:.0e}/sr are no reflectance; check its byte order and units")
     material = Path(path).stem
     return table(planes, layout, material, source=os.fspath(path), sha256=digest.hexdigest(), angles=angles)
 
