@@ -77,6 +77,7 @@ def _f0_error(f: Fit, f0: np.ndarray) -> float:
     """Largest relative error bar of F0: those of the parameters to first order, with their correlations."""
     import jax
 
+    assert f.model is not None  # F0 is its own
     found, count = 0.0, len(f.labels)
     correlation = np.nan_to_num(f.correlation) if f.correlation.shape == (count, count) else np.eye(count)
     for c in range(len(f0)):
