@@ -7,6 +7,7 @@ from typing import TYPE_CHECKING, Any
 if TYPE_CHECKING:
     from .data import preset as preset
     from .errors import InputError as InputError
+    from .fitting import Effort as Effort
     from .fitting import Fit as Fit
     from .fitting import Loss as Loss
     from .fitting import evaluate as evaluate
@@ -51,6 +52,7 @@ _PUBLIC = {
     "report": "reports",
     "save": "tables",
 }
+_MODULES = ("angles", "data", "fitting", "models", "reports", "scenes", "stored_programs", "tables", "tradeoff")
 
 
 def __getattr__(name: str) -> Any:
@@ -58,11 +60,13 @@ def __getattr__(name: str) -> Any:
 
     if name in _PUBLIC:
         return getattr(import_module(f".{_PUBLIC[name]}", __name__), name)
+    if name in _MODULES:
+        return import_module(f".{name}", __name__)
     raise AttributeError(f"module {__name__!r} has no attribute {name!r}")
 
 
 def __dir__() -> list[str]:
-    return sorted([*_PUBLIC, "__version__"])
+    return sorted([*_PUBLIC, *_MODULES, "__version__"])
 
 
 __all__ = [*_PUBLIC, "__version__"]  # pyright: ignore[reportUnsupportedDunderAll]

@@ -1,8 +1,10 @@
 """The house: what is packaged, how long files are, and that the documents say what the project does."""
 
 import importlib
+import inspect
 import re
 import subprocess
+import sys
 import tomllib
 from importlib.metadata import version
 from pathlib import Path
@@ -43,6 +45,26 @@ def test_public_names_exist(folder):
     module = importlib.import_module(folder)
     for name in getattr(module, "__all__", []):
         getattr(module, name)
+
+
+NAMES = """
+import re, sys
+from functools import reduce
+import brdfit
+for name in sys.argv[1:]:
+    reduce(getattr, name.split(".")[1:], brdfit)
+"""
+
+
+def test_names_in_documents_exist_after_one_import():
+    """As they are written, in a fresh interpreter; and type checkers know all that is public."""
+    texts = [p.read_text() for p in _tracked() if p.suffix == ".md"]
+    texts += [inspect.getdoc(getattr(brdfit, name)) or "" for name in brdfit.__all__]
+    names = {n for text in texts for n in re.findall(r"\bbrdfit(?:\.[a-zA-Z_]\w*)+", text)}
+    names -= {n for n in names if n.rsplit(".")[-1] in ("binary", "h5", "toml")}
+    subprocess.run([sys.executable, "-c", NAMES, *sorted(names)], check=True)
+    known = set(re.findall(r"import (\w+) as \1", (ROOT / "__init__.py").read_text()))
+    assert known == set(brdfit.__all__) - {"__version__"}
 
 
 def test_version_is_said_once():
