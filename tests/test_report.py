@@ -72,7 +72,7 @@ def test_an_error_bar_beyond_its_value_is_said(tmp_path):
     fit.spread["specular"][1] = 1.2
     fit.spread["alpha"] = np.asarray(0.19)
     text = Reader(write_report(tmp_path, [fit], [], {}).read_text()).text
-    assert "Not determined by these data, with error bars beyond the values themselves: specular G (0.20 ± 1.2)." in text
+    assert "Not determined by these data, with error bars beyond the values themselves: specular G (0.2 ± 1.2)." in text
 
 
 def test_the_form_limits_only_what_is_clear_of_the_noise(tmp_path):
