@@ -90,11 +90,13 @@ def _compiled(function: Callable[..., Any], structure: Any, leaves: list[Any], k
 
     # Guard: JAX finds a compiled program again by its text and name, and what it found cannot be stored: functions are
     # missing from it when it runs (tests/test_programs.py::test_stored_programs). A name of its own is never found.
-    flat.__name__ = function.__name__ + ("" if key is None else f"_{uuid.uuid4().hex}")
+    own = uuid.uuid4().hex
+    flat.__name__ = function.__name__ + ("" if key is None else f"_{own}")
     arrays = [x for x in leaves if hasattr(x, "dtype")]
     run = jax.jit(flat, compiler_options=options).lower(*arrays).compile()
     if key is not None:
         stored_programs.save(key, run, result)
+        stored_programs.forget(own)
     return _Compiled(run, result)
 
 

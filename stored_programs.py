@@ -121,6 +121,13 @@ def save(path: Path, run: jax.stages.Compiled, result: Any) -> None:
             temporary.write_bytes(zlib.compress(whole, 1))
 
 
+def forget(name: str) -> None:
+    """Delete the copy that JAX keeps in the same directory of a program whose name will not be asked for again."""
+    for copy in _directory.glob(f"*{name}*") if _directory else ():
+        with suppress(OSError):
+            copy.unlink()
+
+
 def _delete_unused(directory: Path) -> None:
     """Delete programs of versions that have not been used for long."""
     for version in directory.glob(f"{PREFIX}*"):
