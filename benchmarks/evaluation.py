@@ -13,10 +13,10 @@ import jax
 import jax.numpy as jnp
 import numpy as np
 from brdfit import models
+from brdfit.angles import unit_vectors
 from brdfit.geometry import Geometry, from_directions
 from brdfit.models import fresnel, ndf
 from brdfit.polar import PolarStencil
-from brdfit.stability.domain import unit
 
 COUNT = 1_100_000
 LIMIT = np.radians(80)
@@ -27,7 +27,7 @@ def geometries():
     """The same pairs without and with a table of polar angles."""
     rng = np.random.default_rng(0)
     angles = rng.uniform(0, LIMIT, (2, COUNT))
-    wi, wo = (unit(t, rng.uniform(0, 2 * np.pi, COUNT)) for t in angles)
+    wi, wo = (unit_vectors(t, rng.uniform(0, 2 * np.pi, COUNT)) for t in angles)
     g = from_directions(wi, wo)
     stencils = (PolarStencil.of(w[:, 2], float(np.arccos(min(wi[:, 2].min(), wo[:, 2].min())))) for w in (wi, wo))
     fields = (g.cos_i, g.cos_o, g.cos_h, g.sin2_h, g.cos_d, g.sin2_d, g.h_x2, g.h_y2)

@@ -10,8 +10,9 @@ from dataclasses import dataclass, field
 from typing import Any
 
 import numpy as np
+from brdfit.angles import unit_vectors
 from brdfit.models import BRDF, MODELS, fresnel, masking, ndf, parameters_of
-from brdfit.stability.domain import GRAZING, NEAR, unit
+from brdfit.stability.domain import GRAZING, NEAR
 from brdfit.stability.parts import PARTS, Part
 from numpy.typing import NDArray
 
@@ -36,23 +37,29 @@ def directions() -> tuple[Reals, Reals]:
     rng = np.random.default_rng(7)
     # polar angles from the fixed set, so that masking is not a new integral for each pair
     angles = rng.choice(POLAR[2:], (RANDOM_DIRECTIONS, 2))
-    ordinary = [(unit(a, rng.uniform(0, 7)), unit(b, rng.uniform(0, 7))) for a, b in angles]
-    mirror = [(unit(t, 0.3), unit(t, 0.3 + np.pi)) for t in POLAR]
+    ordinary = [(unit_vectors(a, rng.uniform(0, 7)), unit_vectors(b, rng.uniform(0, 7))) for a, b in angles]
+    mirror = [(unit_vectors(t, 0.3), unit_vectors(t, 0.3 + np.pi)) for t in POLAR]
     # not at 45 degrees, where the cosine to the mirror direction is 0 but for rounding, and lobes about it end
-    retro = [(unit(t, 0.3), unit(t, 0.3)) for t in np.where(np.arange(len(POLAR)) == 3, np.radians(40), POLAR)]
-    off_across = [
-        (unit(t, 0.3), unit(t, 0.3 + np.pi + offset)) for t in POLAR[[2, 4, 6]] for offset in 10.0 ** np.array([-8, -5, -2])
+    retro = [
+        (unit_vectors(t, 0.3), unit_vectors(t, 0.3)) for t in np.where(np.arange(len(POLAR)) == 3, np.radians(40), POLAR)
     ]
-    off_within = [(unit(POLAR[3], 1.0), unit(POLAR[3] + offset, 1.0 + np.pi)) for offset in (1e-8, -1e-8, 1e-4, 1e-2)]
-    along_tangent = [(unit(t, 0.0), unit(POLAR[2], np.pi)) for t in POLAR[[4, 6]]]
-    along_bitangent = [(unit(t, np.pi / 2), unit(POLAR[2], -np.pi / 2)) for t in POLAR[[4, 6]]]
+    off_across = [
+        (unit_vectors(t, 0.3), unit_vectors(t, 0.3 + np.pi + offset))
+        for t in POLAR[[2, 4, 6]]
+        for offset in 10.0 ** np.array([-8, -5, -2])
+    ]
+    off_within = [
+        (unit_vectors(POLAR[3], 1.0), unit_vectors(POLAR[3] + offset, 1.0 + np.pi)) for offset in (1e-8, -1e-8, 1e-4, 1e-2)
+    ]
+    along_tangent = [(unit_vectors(t, 0.0), unit_vectors(POLAR[2], np.pi)) for t in POLAR[[4, 6]]]
+    along_bitangent = [(unit_vectors(t, np.pi / 2), unit_vectors(POLAR[2], -np.pi / 2)) for t in POLAR[[4, 6]]]
     normal = np.array([0.0, 0.0, 1.0])
     corners = [
         (normal, normal),
-        (normal, unit(POLAR[4], 2.0)),
-        (unit(GRAZING, 0.1), normal),
-        (unit(GRAZING, 0.1), unit(GRAZING, 0.2)),  # half vector on the horizon
-        (unit(GRAZING, 0.1), unit(POLAR[5], 3.0)),
+        (normal, unit_vectors(POLAR[4], 2.0)),
+        (unit_vectors(GRAZING, 0.1), normal),
+        (unit_vectors(GRAZING, 0.1), unit_vectors(GRAZING, 0.2)),  # half vector on the horizon
+        (unit_vectors(GRAZING, 0.1), unit_vectors(POLAR[5], 3.0)),
     ]
     pairs = ordinary + mirror + retro + off_across + off_within + along_tangent + along_bitangent + corners
     wi, wo = (np.stack(side) for side in zip(*pairs, strict=True))

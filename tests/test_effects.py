@@ -13,6 +13,7 @@ import jax
 import jax.numpy as jnp
 import numpy as np
 import pytest
+from brdfit.angles import unit_vectors
 from brdfit.data.synthetic.layouts import grid as grid_of
 from brdfit.fitting.result import from_record
 from brdfit.geometry import from_directions
@@ -23,7 +24,6 @@ from brdfit.models.interreflection import compensation
 from brdfit.references import REFERENCES
 from brdfit.reports.physics import hemisphere
 from brdfit.scenes.choose import without
-from brdfit.stability.domain import unit
 
 from .cases import WI, WO
 from .effect_cases import TERMS, drawn, wanted
@@ -453,7 +453,10 @@ def test_narrow_lobes():
 
     widths = np.array([1e-9, 1e-6, 1e-5, 1e-4, 1e-2, 0.1, 1, 1.5])
     widths, tails = (a.ravel() for a in np.meshgrid(widths, [0.5, 1.03, 1.5, 2, 4, 100]))
-    ends = [np.stack([unit(np.radians(t), 0.3) for t in (0.0, 20.0, 70.0, 89.9)]), np.stack([unit(0.5, 3.0)] * 4)]
+    ends = [
+        np.stack([unit_vectors(np.radians(t), 0.3) for t in (0.0, 20.0, 70.0, 89.9)]),
+        np.stack([unit_vectors(0.5, 3.0)] * 4),
+    ]
 
     def every(function):
         return jax.jit(jax.vmap(jax.vmap(function, (None, None, 0, 0)), (0, 0, None, None)))

@@ -9,6 +9,7 @@ from __future__ import annotations
 
 import numpy as np
 import pytest
+from brdfit.angles import unit_vectors
 from brdfit.stability import domain, measure, reference
 from brdfit.stability.parts import PARTS, POLAR, Part
 from hypothesis import HealthCheck, Phase, given, settings, target
@@ -88,7 +89,7 @@ def directions(draw: st.DrawFn) -> np.ndarray:
     turn = draw(st.one_of(st.sampled_from([0.0, np.pi]), st.floats(0, 2 * np.pi)))
     tilt, twist = (draw(st.one_of(st.just(0.0), st.floats(-8, -1).map(lambda e: 10.0**e))) for _ in range(2))
     other = draw(st.one_of(st.just(min(theta + tilt, domain.GRAZING)), st.floats(0, domain.GRAZING)))
-    pair = np.concatenate([domain.unit(theta, phi), domain.unit(other, phi + turn + twist)])
+    pair = np.concatenate([unit_vectors(theta, phi), unit_vectors(other, phi + turn + twist)])
     return np.asarray(np.where(np.abs(pair) < SMALLEST, 0, pair))
 
 
