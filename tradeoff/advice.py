@@ -62,15 +62,15 @@ def _fastest(measured: Sequence[Setting], allowed: object) -> Setting | None:
     return min((s for s in measured if allowed(s)), key=lambda s: s.seconds.median, default=None)  # type: ignore[operator]
 
 
-def rendering_advice(drawn: Sequence[Rendering]) -> str:
-    """Which model to render with."""
+def rendering_advice(drawn: Sequence[Rendering], seen: float = SEEN) -> str:
+    """Which model to render with; up to ``seen`` no one sees an error, 0 where that is not known."""
     if not drawn:
         return "No model could be fitted, so that none can be rendered."
     best = min(drawn, key=lambda r: r.errors["perceptual"])
-    limit = max(SEEN, NEARLY * best.errors["perceptual"])
+    limit = max(seen, NEARLY * best.errors["perceptual"])
     good = [r for r in drawn if r.errors["perceptual"] <= limit]
     pick = min(good, key=lambda r: r.seconds.median * r.errors["perceptual"])
-    near = "hardly anyone sees" if pick.errors["perceptual"] <= SEEN else f"within {NEARLY - 1:.0%} of the smallest"
+    near = "hardly anyone sees" if pick.errors["perceptual"] <= seen else f"within {NEARLY - 1:.0%} of the smallest"
     said = (
         f"Render with {pick.label}: {nanoseconds(pick)} a direction for a perceptual error of "
         f"{significant(pick.errors['perceptual'])}"
@@ -125,37 +125,56 @@ def fresnel_advice(forms: Sequence[Approximation]) -> str:
 def masking_advice(forms: Sequence[Approximation]) -> str:
     """Whether a simpler masking does."""
     said = _exchange_advice(forms, "No microfacet model could be fitted.")
-    return f"{said[:-1]} (Smith's by its integral, which a table made once replaces)." if forms else said
+    return f"{said[:-1]} (Smith's is read from a table made once)." if forms else said
+
+
+def without_spikes(advice: str, spikes: Sequence[str]) -> str:
+    """The advice, and which models it leaves out."""
+    if not spikes:
+        return advice
+    return f"{advice} Left out: {listed(spikes)}, fitted with a lobe that is a spike between the measured directions."
 
 
 def _exchange_advice(forms: Sequence[Approximation], nothing: str) -> str:
+    """Errors and the compiler's counts decide, which are the same in every run; times are only told."""
     if not forms:
         return nothing
     said = []
     for own in (f for f in forms if f.own):
         other = next(f for f in forms if f.model == own.model and f.form == COUNTERPART[own.form])
-        ratio = other.seconds.median / own.seconds.median
-        cost = (
-            f"takes {significant(ratio, 2)} times the time"
-            if ratio >= 1
-            else f"is {significant(1 / ratio, 2)} times as fast"
-        )
-        if max(own.seconds.low, other.seconds.low) <= min(own.seconds.high, other.seconds.high):
-            cost = "takes the same time"
+        mine, its = _form(own.form), _form(other.form)
         if not other.refitted:
-            said.append(f"in {own.model} keep {_form(own.form)}: with {_form(other.form)} it could not be fitted again")
+            said.append(f"in {own.model} keep {mine}: no fit with {its} is of use")
             continue
         changes = {k: other.refitted[k] / own.refitted[k] - 1 for k in other.refitted}
-        better = changes["perceptual"] < 1 / NEARLY - 1 or (changes["perceptual"] <= NEARLY - 1 and cost.endswith("as fast"))
-        kept, left = (other, own) if better else (own, other)
+        cheaper = NEARLY * other.operations.count < own.operations.count
+        better = changes["perceptual"] < 1 / NEARLY - 1
+        worse = changes["perceptual"] > NEARLY - 1
+        if better or (cheaper and not worse):
+            why = "the error is smaller" if better else "about as good, with fewer operations"
+            verdict = f"take {its}, not {mine}: {why}"
+        else:
+            why = "the error is larger" if worse else "about as good, but not a tenth fewer operations"
+            verdict = f"keep {mine}, not {its}: {why}"
         effect = listed(f"{_signed(v)} ({k})" for k, v in changes.items())
-        verdict = f"{'take' if better else 'keep'} {_form(kept.form)}, not {_form(left.form)}"
         said.append(
-            f"in {own.model} {verdict}: {_form(other.form)} {cost}, "
-            f"moves 1 value in 100 by more than {percent(other.large)} and, fitted again, changes the error by {effect}"
+            f"in {own.model} {verdict}; {its} {_cost(own, other)}, moves 1 value in 100 by more than {percent(other.large)} "
+            f"and, fitted again, changes the error by {effect}"
         )
     text = "; ".join(said) + "."
     return text[0].upper() + text[1:]
+
+
+def _cost(own: Approximation, other: Approximation) -> str:
+    """Time of the other form, where it is clear of the spread and the operations agree; and the operations."""
+    more = other.operations.count / own.operations.count - 1
+    ratio = other.seconds.median / own.seconds.median
+    cost = "takes the same time as far as can be told"
+    if other.seconds.low > own.seconds.high and more > 0:
+        cost = f"takes {significant(ratio, 2)} times the time"
+    elif other.seconds.high < own.seconds.low and more < 0:
+        cost = f"is {significant(1 / ratio, 2)} times as fast"
+    return f"{cost} ({_signed(more)} operations)"
 
 
 def _form(form: str) -> str:
@@ -166,4 +185,12 @@ def _signed(share: float) -> str:
     return minus(f"{100 * share:+.1f} %")
 
 
-__all__ = ["fresnel_advice", "masking_advice", "nanoseconds", "quadrature_advice", "rendering_advice", "settings_advice"]
+__all__ = [
+    "fresnel_advice",
+    "masking_advice",
+    "nanoseconds",
+    "quadrature_advice",
+    "rendering_advice",
+    "settings_advice",
+    "without_spikes",
+]

@@ -13,9 +13,11 @@ from numpy.typing import NDArray
 from ..fitting import Effort, Fit, fit
 from ..models import BRDF, parameter_values
 from ..tables import Table
-from .evaluation import Evaluation, direct
+from ..tabulated import read, tabulate
+from .evaluation import Evaluation, Operations, direct
 from .exchange import COUNTERPART, FRESNELS, MASKINGS, PARTS, exchanged
 from .sample import Sample
+from .spike import highest_peak, is_spike
 from .timing import Timing, interleaved
 
 Reals = NDArray[np.float64]
@@ -36,7 +38,9 @@ class Approximation:
     own: bool
     """Whether it is the form that the model is defined with."""
     seconds: Timing
-    """For one pair of directions and all channels, in float32."""
+    """For one pair of directions and all channels, in float32; Smith's masking is read from a table made once."""
+    operations: Operations
+    """Of the same program."""
     typical: float
     """Median relative difference of the BRDF from the model's own form, with the same parameters."""
     large: float
@@ -44,7 +48,7 @@ class Approximation:
     errors: dict[str, float]
     """On a sample of the cells, with the same parameters."""
     refitted: dict[str, float]
-    """Over all cells, with the parameters fitted again; empty if that fit did not converge."""
+    """Over all cells, with the parameters fitted again; empty if that fit did not converge, or became a spike."""
 
 
 def approximations(
@@ -54,13 +58,16 @@ def approximations(
     programs: dict[tuple[str, str], Evaluation] = {}
     values: dict[tuple[str, str], Reals] = {}
     refits: dict[tuple[str, str], Future[dict[str, float]]] = {}
+    highest = highest_peak(table)
     with ThreadPoolExecutor(os.cpu_count()) as pool:  # programs are compiled and run outside Python's lock
         for f in fits:
             for k, (form, m) in enumerate(_forms(part, f.model).items()):
                 key = f.model_name, form
-                refits[key] = pool.submit(_refitted, table, m, f) if k else pool.submit(dict, f.errors)
-                programs[key] = Evaluation(direct, m, sample, "float32")
-                values[key] = Evaluation(direct, m, sample, "float64").values()
+                refits[key] = pool.submit(_refitted, table, m, f, highest) if k else pool.submit(dict, f.errors)
+                made = tabulate(m)
+                how, what = (read, made) if made.tables else (direct, m)
+                programs[key] = Evaluation(how, what, sample, "float32")
+                values[key] = Evaluation(how, what, sample, "float64").values()
     seconds = interleaved(programs, REPEATS, BUDGET)
     out = []
     first: dict[str, str] = {}
@@ -74,6 +81,7 @@ def approximations(
                 form=form,
                 own=first[name] == form,
                 seconds=seconds[name, form].per(len(sample.wi)),
+                operations=programs[name, form].operations(),
                 typical=float(np.median(off)),
                 large=float(np.percentile(off, 99)),
                 errors={k: sample.error(values[name, form], k) for k in losses},
@@ -95,10 +103,10 @@ def _forms(part: str, model: BRDF | None) -> dict[str, BRDF]:
     return {form: exchanged(cls, masking=MASKINGS[form].visibility)(**values) for form in (own, COUNTERPART[own], "none")}
 
 
-def _refitted(table: Table, start: BRDF, like: Fit) -> dict[str, float]:
+def _refitted(table: Table, start: BRDF, like: Fit, highest: float) -> dict[str, float]:
     """Errors of a fit that starts at the old parameters: nearby optima are what an exchanged part is judged by."""
     again = fit(table, start, loss=like.loss, measure=like.measure, max_angle=like.max_angle, effort=NEARBY)
-    return again.errors if again.converged else {}
+    return again.errors if again.converged and not is_spike(again.model, highest) else {}
 
 
 __all__ = ["Approximation", "approximations"]

@@ -27,6 +27,11 @@ class Operations:
     bytes: float
     """Bytes that are read or written."""
 
+    @property
+    def count(self) -> float:
+        """Flops and transcendentals together."""
+        return self.flops + self.transcendentals
+
 
 class Evaluation:
     """``function(what, wi, wo)`` compiled for the directions of a sample, in ``float32`` or ``float64``.

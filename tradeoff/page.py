@@ -159,6 +159,7 @@ def _exchange(a: Approximation, loss: str) -> dict[str, Any]:
         "form": a.form,
         "own": a.own,
         "time": _nano(a.seconds),
+        "operations": thousands(a.operations.count),
         "typical": f"{significant(100 * a.typical, 2)} %",
         "large": f"{significant(100 * a.large, 2)} %",
         "errors": both(a.errors),

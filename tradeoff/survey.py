@@ -5,15 +5,26 @@ from __future__ import annotations
 import time
 from dataclasses import dataclass
 
+import numpy as np
+
 from ..fitting import Fit, fit_many
 from ..progress import Progress
+from ..reports.words import SEEN, no_word
 from ..tables import Table
-from .advice import fresnel_advice, masking_advice, quadrature_advice, rendering_advice, settings_advice
+from .advice import (
+    fresnel_advice,
+    masking_advice,
+    quadrature_advice,
+    rendering_advice,
+    settings_advice,
+    without_spikes,
+)
 from .approximations import Approximation, approximations
 from .rendering import Rendering, renderings
 from .sample import draw
 from .settings import Setting, settings
 from .smith import Quadrature, quadratures
+from .spike import highest_peak, is_spike
 
 MODELS = ("gtr", "abc", "sgd", "ward", "ashikhmin_shirley", "lambert")
 """What is compared: the models that are fitted by default, and a body without a lobe. All there are would take minutes."""
@@ -79,29 +90,34 @@ def tradeoff(
         progress.advance(f"{f.model_name}: perceptual {f.errors['perceptual']:.5f}, {took}" if f.model else f.reason)
     fits.sort(key=lambda f: list(MODELS).index(f.model_name))
     losses = tuple(dict.fromkeys(("perceptual", loss)))
+    highest = highest_peak(table)
+    spikes = [f.model_name for f in fits if f.model is not None and is_spike(f.model, highest)]
     advice: dict[str, str] = {}
 
     def advised(question: str, sentence: str) -> None:
-        advice[question] = sentence
-        progress.advance(f"{question}: {sentence}")
+        advice[question] = without_spikes(sentence, spikes)
+        progress.advance(f"{question}: {advice[question]}")
 
     progress.say("rendering")
     drawn = renderings(fits, sample)
-    advised("rendering", rendering_advice(drawn))
+    cosines = sample.wi[:, 2] * sample.wo[:, 2]
+    reflectance = np.pi * float((sample.measured.mean(1) * cosines).sum() / cosines.sum())
+    seen = 0.0 if no_word(measure, reflectance) else SEEN
+    advised("rendering", rendering_advice([r for r in drawn if r.model not in spikes], seen))
     progress.say("Smith's integral")
     rules = quadratures(fits, sample, losses)
-    advised("quadrature", quadrature_advice(rules))
+    advised("quadrature", quadrature_advice([r for r in rules if r.model not in spikes]))
     progress.say("Fresnel")
     fresnel = approximations("fresnel", fits, table, sample, losses)
-    advised("fresnel", fresnel_advice(fresnel))
+    advised("fresnel", fresnel_advice([a for a in fresnel if a.model not in spikes]))
     progress.say("masking")
     masking = approximations("masking", fits, table, sample, losses)
-    advised("masking", masking_advice(masking))
+    advised("masking", masking_advice([a for a in masking if a.model not in spikes]))
     progress.say("settings of a fit")
     usable = [f for f in fits if f.model is not None and f.model_name == (model or f.model_name)]
     optimum, measured = None, list[Setting]()
     if usable:
-        best = min(usable, key=lambda f: f.errors["perceptual"])
+        best = min(usable, key=lambda f: (f.model_name in spikes, f.errors["perceptual"]))
         optimum, measured = settings(table, best, max(LEAST, WHOLE - (time.perf_counter() - begin)))
     advised("settings", settings_advice(measured, optimum))
     return Tradeoff(table, tuple(fits), optimum, measured, drawn, rules, fresnel, masking, advice)
