@@ -472,3 +472,13 @@ def test_narrow_lobes():
     assert wide.sum() > 40
     # 1 - E of 1e-2 is a difference from 1, a sum of a thousand roundings, and enters three times
     np.testing.assert_allclose(np.asarray(single[0])[wide], np.asarray(double)[wide], rtol=1e-2)
+
+
+def test_a_mirror_takes_no_light_away():
+    """What lobes this narrow miss is rounding of either sign, and what is returned for it is neither negative nor seen."""
+    with jax.enable_x64(True):
+        g = from_directions(*(jnp.asarray(unit_vectors(t, 0.3)) for t in (0.4, 1.1)))
+        widths = jnp.asarray(np.geomspace(1e-30, 1e-6, 40))
+        returned = jax.jit(jax.vmap(lambda alpha: compensation(ndf.GGX(alpha), jnp.asarray(0.9), g)))(widths)
+    assert (np.asarray(returned) >= 0).all()
+    assert (np.asarray(returned) < 1e-10).all()
