@@ -106,7 +106,8 @@ def _forms(part: str, model: BRDF | None) -> dict[str, BRDF]:
 def _refitted(table: Table, start: BRDF, like: Fit, highest: float) -> dict[str, float]:
     """Errors of a fit that starts at the old parameters: nearby optima are what an exchanged part is judged by."""
     again = fit(table, start, loss=like.loss, measure=like.measure, max_angle=like.max_angle, effort=NEARBY)
-    return again.errors if again.converged and not is_spike(again.model, highest) else {}
+    useful = again.converged and again.model is not None and not is_spike(again.model, highest)
+    return again.errors if useful else {}
 
 
 __all__ = ["Approximation", "approximations"]
