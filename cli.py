@@ -194,7 +194,8 @@ def fit_command(
                         f = replace(f, measure=f"scene {scene.name}")
                     fits[first:] = sorted([*fits[first:], f], key=lambda f: names.index(f.model_name))
                     write_fits(out, fits, where)
-                    progress.advance("\n  ".join(filter(None, (_line(f), planned(f)))))
+                    said = (_line(f), planned(f), *(f"WARNING: {w}" for w in f.warnings))
+                    progress.advance("\n  ".join(filter(None, said)))
                     if report:  # meanwhile the next fits go on
                         preload()
                         views = views or Views(table, max_angle)
@@ -401,7 +402,7 @@ def _line(f: Fit) -> str:
     took = f"{f.seconds['prepare'] + f.seconds['solve']:.2f} s + {f.seconds['compile']:.2f} s compiling"
     verdict = "" if f.converged else f"  NOT CONVERGED: {f.reason}"
     errors = "  ".join(f"{name} {f.errors[name]:.5f}" for name in dict.fromkeys(("perceptual", f.loss)))
-    return f"{f.material}  {f.model_name:18s}{errors}  {took}{verdict}"
+    return f"{f.material}  {f.model_name:18s} {errors}  {took}{verdict}"
 
 
 __all__ = ["run"]

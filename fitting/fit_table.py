@@ -57,6 +57,8 @@ class Prepared:
     """The loss, bound to the table."""
     losses: tuple[Loss, ...]
     """Every loss that errors are reported under, bound to the table."""
+    largest: float
+    """The largest fitted value, 1/sr."""
     seconds: float
     """What that took, nothing compiled: for all fits that share it."""
 
@@ -88,9 +90,9 @@ def prepare(
             named = in_threads(lambda v: _named_losses(v, bound), [values])
             kept.clear()
             both = compress(cells, table, used, max_angle, measure, bound) if compressed else cells
-            summarised, losses = next(summary), next(named)
+            summarised, losses, largest = next(summary), next(named), float(values.max(initial=0.0))
             took = time.perf_counter() - begin - compiled.away
-        kept[key] = Prepared(both, used, summarised, bound, losses, took)
+        kept[key] = Prepared(both, used, summarised, bound, losses, largest, took)
         return kept[key]
 
 
@@ -235,7 +237,15 @@ def _fit(
             make_ready(Problem(ready.samples, bound_loss, forms[0]), named)
         found = _search(forms, ready.samples, bound_loss, proposals, frozenset(held), bounds, effort)
         found, judged = settle(found, Problem(ready.samples, bound_loss, found[0].problem.chart), named, effort)
-        errors = judged.errors
+        errors = dict(zip((e.name for e in named), map(float, judged.errors), strict=True))
+    warnings = []
+    if start == "published" and not given:
+        warnings.append("no published fit of this model to this material is known: it started from the data alone")
+    if errors["ngan"] > ready.largest:
+        warnings.append(
+            f"its values are off by {errors['ngan']:.2g}/sr in the root mean square, where no measured one is above "
+            f"{ready.largest:.2g}/sr: a lobe narrower than the cells; fit with --loss ngan or another model"
+        )
     converged, reason = _verdict(found, effort.rtol)
     solve = time.perf_counter() - prepared - (compiled.away - early)
     return Fit(
@@ -244,7 +254,8 @@ def _fit(
         model=cls(**judged.estimate.parameters),
         converged=converged,
         reason=reason,
-        errors={e.name: float(v) for e, v in zip(named, errors, strict=True)},
+        errors=errors,
+        warnings=tuple(warnings),
         seconds={
             "load": table.seconds,
             "prepare": ready.seconds,
@@ -252,7 +263,7 @@ def _fit(
             "solve": max(solve, 0.0),
         },
         starts=found[0].starts,
-        optima=_scaled(found, float(errors[[e.name for e in named].index(bound_loss.name)])),
+        optima=_scaled(found, errors[bound_loss.name]),
         passes=max(f.passes for f in found),
         path="exact" if any(f.exact for f in found) else "compressed",
         shift=float(judged.shift.max(initial=0.0)),

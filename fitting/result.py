@@ -73,6 +73,8 @@ class Fit:
     correlation: Reals = field(default_factory=lambda: np.zeros((0, 0)))
     undetermined: tuple[str, ...] = ()
     """Labels of parameters that the data do not determine."""
+    warnings: tuple[str, ...] = ()
+    """What else to know before its numbers are used, in words."""
     starts: int = 0
     optima: tuple[Optimum, ...] = ()
     """Distinct optima, best first."""
@@ -143,6 +145,7 @@ class Fit:
             "fixed": list(self.fixed),
             "at_bound": list(self.at_bound),
             "undetermined": list(self.undetermined),
+            "warnings": list(self.warnings),
             "labels": list(self.labels),
             "correlation": plain(self.correlation),
             "converged": self.converged,
@@ -190,6 +193,7 @@ def from_record(record: dict[str, Any]) -> Fit:
         fixed=tuple(record.get("fixed", ())),
         at_bound=tuple(record["at_bound"]),
         undetermined=tuple(record.get("undetermined", ())),
+        warnings=tuple(record.get("warnings", ())),
         labels=tuple(record.get("labels", ())),
         correlation=_array(record.get("correlation", [])),
         starts=record.get("starts", 0),

@@ -232,6 +232,8 @@ def _remarks(f: Fit, channel_names: tuple[str, ...]) -> list[View]:
     if vague:
         shown = names(f"{e} ({words.uncertain(v, bar)} ± {significant(bar, 2)})" for e, v, bar in vague)
         say(f"not determined by these data, with error bars beyond the values themselves: {shown}.", True)
+    for warning in f.warnings:
+        say(f"{warning}.", True)
     if f.fixed:
         say(f"held fixed: {names(f.fixed)}.")
     pairs = f.strong_correlations()

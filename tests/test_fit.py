@@ -13,6 +13,7 @@ import numpy as np
 import pytest
 from brdfit.data.synthetic import Floor, Missing, Relative, generate, scattered
 from brdfit.fitting.batch import fit_many
+from brdfit.fitting.result import from_record
 from brdfit.models.base import BRDF, parameter
 from brdfit.models.ward import Ward
 from brdfit.tables.table import table as make_table
@@ -248,6 +249,18 @@ def test_preparing_is_told_by_every_fit_that_shares_it():
     table, _ = noisy(seed=9)
     fits = list(brdfit.fit_many(table, ("ward", "lambert")))
     assert fits[0].seconds["prepare"] == fits[1].seconds["prepare"] > 1e-4, "reading 1e5 values takes longer than that"
+
+
+def test_warnings():
+    """A lobe between the cells costs a fit nothing, and a published start that does not exist is none."""
+    table, _ = noisy()
+    plain = brdfit.fit(table, "ward")
+    assert plain.warnings == ()
+    spike = brdfit.fit(table, "ward", fixed={"alpha": 1e-4, "specular": 1.0}, start="published")
+    unknown, narrow = spike.warnings
+    assert unknown.startswith("no published fit of this model to this material is known")
+    assert "a lobe narrower than the cells" in narrow
+    assert from_record(spike.record()).warnings == spike.warnings
 
 
 class Cosine(BRDF):
