@@ -58,12 +58,11 @@ def _nearest(f: Fit, f0: np.ndarray) -> View:
     if f0.shape != (3,) or not np.isfinite(f0).all():
         return {"nearest": None, "why": "only for three channels", "swatch": None}
     view: View = {"nearest": None, "swatch": _hex(f0)}
-    error = _f0_error(f, f0)
     substance, distance = materials.nearest(f0)
-    if error > materials.NEAR:
-        return view | {"why": f"none named: F0 is known to ± {words.percent(error)} only"}
     if distance > materials.NEAR:
-        return view | {"why": f"none within {materials.NEAR:.0%}".replace("%", " %")}
+        return view | {"why": f"none within {words.percent(materials.NEAR)}"}
+    if (error := _f0_error(f, f0)) > materials.NEAR:
+        return view | {"why": f"none named: F0 is known to ± {words.percent(error)} only"}
     value = " ".join(f"{v:.3g}" for v in substance.f0)
     return view | {
         "nearest": substance.name,

@@ -80,7 +80,7 @@ def test_copper_is_copper():
     [
         ([0.95, 0.64, 0.54], 0.01, "copper"),
         ([0.95, 0.64, 0.54], 0.2, "none named: F0 is known to ± 20.0 % only"),
-        ([0.185, 0.166, 0.145], 0.01, "none within 10 %"),  # a rough nickel: as low as diamond, but coloured
+        ([0.185, 0.166, 0.145], 0.01, "none within 10.0 %"),  # a rough nickel: as low as diamond, but coloured
     ],
 )
 def test_a_substance_is_named_where_it_means_something(specular, spread, said):
