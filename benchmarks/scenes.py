@@ -106,10 +106,12 @@ def exhausted(bench: SceneBench, chosen: Tried, own: Tried, limit: Tolerance) ->
     """Of all sets of up to :data:`LARGEST` effects those that meet the tolerance for less than the chosen one, and the
     effects of the truth that all hold that meet it for no more than the truth.
 
-    Sets are fitted one by one, each from the best two of its subsets: nothing is left out.
+    Sets are fitted one by one, each from the best two of its subsets: nothing that costs no more is left out.
     """
     fits: dict[frozenset[str], Tried] = {}
-    for s in sorted((s for s in every(bench.screen.among) if len(s) <= LARGEST), key=len):
+    dearest = max(estimate(chosen.effects), estimate(own.effects))
+    sets = [s for s in every(bench.screen.among) if len(s) <= LARGEST and estimate(s) <= dearest]
+    for s in sorted(sets, key=len):
         near = sorted((t for o, t in fits.items() if o < s), key=lambda t: t.fit_error)[:2]
         fits[s] = Tried(bench.fit(s, [t.fitted for t in near]), bench)
     good = [s for s, t in fits.items() if limit.met(t.seen)]

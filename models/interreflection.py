@@ -137,8 +137,8 @@ def compensation(facets: Any, mean_reflectance: Float[Array, ""], g: Geometry) -
     light, viewer = g.at_polar(missing)
     mean = missing.mean()
     f = mean_reflectance**2 * (1 - mean) / (1 - mean_reflectance * mean)
-    # Guard: 0/0 for a mirror, which misses nothing but what quadrature and rounding leave
-    # (tests/test_effects.py::test_finite_at_corners).
+    # Guard: what a lobe narrower than 1e-6 misses is rounding, of either sign, and of the quotient of such the sign is, too
+    # (tests/test_effects.py::test_a_mirror_takes_no_light_away).
     least = 100 * float(np.finfo(np.dtype(mean.dtype)).eps)
     return f / (jnp.pi * (mean + least)) * (light * viewer)
 

@@ -101,9 +101,9 @@ def shown(here: Look) -> Shown:
     """
     pixels, root_weight = _drawn(here)
     part = here.light.part(pixels)
-    wi, wo, arriving = _directions(part, here.alpha)
-    there, back = _cells(here.table)
     channels = here.table.channels
+    wi, wo, arriving = _directions(part, here.alpha, channels)
+    there, back = _cells(here.table)
     cells = np.repeat(0.8 * np.pi * there[:, 2:], channels, 1)
     lit = np.concatenate([arriving.reshape(-1, channels) * here.exposure, cells])
     root_weight = np.concatenate([root_weight * np.sqrt(1 - SHARE), np.full(ELSEWHERE, np.sqrt(SHARE / ELSEWHERE))])
@@ -141,7 +141,7 @@ def _drawn(here: Look) -> tuple[NDArray[np.intp], Reals]:
     return chosen, np.sqrt(1 / (len(y) * density[chosen] * count))
 
 
-def _directions(light: Illumination, alpha: float) -> tuple[Reals, Reals, Reals]:
+def _directions(light: Illumination, alpha: float, channels: int) -> tuple[Reals, Reals, Reals]:
     """Directions to the light and to the camera ``[P, J, 3]`` and what f there is multiplied by ``[P, J, C]``."""
     rows = [(np.asarray(p.wi), np.asarray(p.arriving)) for p in light.punctual]
     if light.extended is not None:
@@ -154,9 +154,10 @@ def _directions(light: Illumination, alpha: float) -> tuple[Reals, Reals, Reals]
                 wi, reach = drawn(*cast(given, "float64"))
             rows += [(w, a / ROUNDS) for w, a in zip(np.asarray(wi), np.asarray(reach), strict=True)]
     if not rows:
-        rows = [(np.zeros((len(light.wo), 3)), np.zeros((len(light.wo), 1)))]
+        rows = [(np.zeros((len(light.wo), 3)), np.zeros((len(light.wo), channels)))]
     wi, arriving = (np.stack(x, 1) for x in zip(*rows, strict=True))
     # Guard: below the horizon models are not defined, and 0 * inf = NaN; the normal stands for such directions
+    # (tests/test_scenes_screen.py::test_no_direction_below_the_horizon).
     wi = np.where(arriving.any(-1, keepdims=True), wi, [0.0, 0.0, 1.0])
     return wi, np.broadcast_to(np.asarray(light.wo)[:, None], wi.shape), arriving
 
@@ -180,13 +181,14 @@ def _ambient(cosine: Reals, scale: Reals) -> tuple[Ambient, Reals, Reals]:
     unit = np.polynomial.chebyshev.chebpts1(ANGLES)
     nodes = (low + high) / 2 + (high - low) / 2 * unit
     basis = np.polynomial.chebyshev.chebvander(unit, ANGLES - 1)
-    # Guard: 0/0 where all pixels are seen at one angle
+    # Guard: 0/0 where all pixels are seen at one angle (tests/test_scenes_screen.py::test_one_angle).
     place = (cosine - (low + high) / 2) / max((high - low) / 2, 1e-12)
     spread = np.polynomial.chebyshev.chebvander(place, ANGLES - 1) @ np.linalg.inv(basis)
     rules = [hemisphere(float(np.arccos(c)), RULE) for c in nodes]
     wi, weight = np.stack([r[1] for r in rules]), np.stack([r[2] for r in rules])
     wo = np.broadcast_to(np.stack([r[0] for r in rules])[:, None], wi.shape)
-    # Guard: directions of no weight may lie below the horizon, where models are not defined; the normal stands for them.
+    # Guard: directions of no weight may lie below the horizon, where models are not defined; the normal stands for them
+    # (tests/test_scenes_screen.py::test_no_direction_below_the_horizon).
     wi = np.where(weight[..., None] > 0, wi, [0.0, 0.0, 1.0])
     parts: Any = (weight, spread, scale)
     return Ambient(*parts), wi.reshape(-1, 3), wo.reshape(-1, 3)

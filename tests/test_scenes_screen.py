@@ -12,7 +12,7 @@ from brdfit.models.effects import EFFECTS, in_order
 from brdfit.scenes.appearance import look
 from brdfit.scenes.fitted_pixels import shown
 from brdfit.scenes.linear import factor
-from brdfit.scenes.scene import Ambient, Camera, Directional, Scene, Sphere
+from brdfit.scenes.scene import Ambient, Area, Camera, Directional, Plane, Scene, Sphere
 from brdfit.scenes.screen import Fitted, Screen, alone, own
 
 from .cases import WI, WO
@@ -77,6 +77,22 @@ def test_slopes(scene):
     for k in range(len(slopes)):
         moved = np.eye(len(x))[k] * step
         assert (cost(x + moved) - cost(x - moved)) / (2 * step) == pytest.approx(slopes[k], rel=1e-5, abs=1e-6)
+
+
+def test_no_direction_below_the_horizon(small_table):
+    """Of lights behind the surface, of samples that missed the hemisphere, of nodes of an albedo."""
+    lights = (Directional((1.0, 0.0, -0.5), (3.0,) * 3), Area((2.0, 0.0, 0.0), 0.5, (9.0,) * 3), Ambient((0.7,) * 3))
+    data = shown(look(small_table[0], Scene("", Sphere(), Camera(pixels=(12, 12)), lights)))
+    assert (np.asarray(data.geometry.cos_i) > 0).all()
+    assert (data.arriving == 0).all(1).any()  # some were below
+    assert np.isfinite(data.target).all()
+
+
+def test_one_angle(small_table):
+    """A plane far away: one polar angle for all pixels, whose albedo is that of the angle."""
+    scene = Scene("", Plane(normal=(0.0, 0.0, 1.0)), Camera(pixels=(8, 8)), (Ambient((0.7,) * 3),))
+    data = shown(look(small_table[0], scene))
+    np.testing.assert_allclose(data.ambient.spread.sum(1), 1)
 
 
 def test_factors():
