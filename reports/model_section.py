@@ -5,6 +5,7 @@ from __future__ import annotations
 import math
 import re
 from collections.abc import Iterable
+from functools import cache
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
@@ -17,6 +18,7 @@ from .words import significant
 
 if TYPE_CHECKING:
     from ..fitting.result import Fit
+    from ..models import BRDF
 
 View = dict[str, Any]
 
@@ -81,7 +83,7 @@ def _f0_error(f: Fit, f0: np.ndarray) -> float:
     correlation = np.nan_to_num(f.correlation) if f.correlation.shape == (count, count) else np.eye(count)
     for c in range(len(f0)):
         with jax.enable_x64(True):
-            slope = jax.grad(lambda m: m.normal_reflectance())(physics.channel(f.model, c))
+            slope = _slope()(physics.channel(f.model, c))
         step = np.zeros(len(f.labels))
         for name, value in f.parameters.items():
             label = f"{name}[{c}]" if value.ndim else name
@@ -89,6 +91,21 @@ def _f0_error(f: Fit, f0: np.ndarray) -> float:
                 step[f.labels.index(label)] = float(getattr(slope, name)) * _error_bar(f, name)[c if value.ndim else 0]
         found = max(found, math.sqrt(max(float(step @ correlation @ step), 0.0)) / max(abs(float(f0[c])), 1e-30))
     return found
+
+
+@cache
+def _slope() -> Any:
+    """The derivative of F0 of one channel by each parameter, as a model; made on first use, as it needs JAX."""
+    from ..programs import program
+
+    return program(_derivative)
+
+
+def _derivative(model: BRDF) -> BRDF:
+    import jax
+
+    slope: BRDF = jax.grad(lambda m: m.normal_reflectance())(model)
+    return slope
 
 
 def _error_bar(f: Fit, name: str) -> np.ndarray:
