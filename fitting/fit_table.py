@@ -22,7 +22,7 @@ from .effort import DEFAULT, Effort
 from .estimate import Judgement, errors_of, judge, make_ready
 from .gram import Problem, Span
 from .grid_samples import compress
-from .losses import LOSSES, Loss, LossFunction, named_loss
+from .losses import LOSSES, Loss, LossFunction, check_loss, named_loss
 from .plan import RUNGS, plan
 from .result import Fit, Named, Optimum
 from .samples import Samples, samples
@@ -153,11 +153,16 @@ def fit(
         A :class:`Fit`. A fit that failed is a result with ``converged`` False and the ``reason`` in words.
 
     Raises:
-        ValueError: Unknown model, loss, measure or parameter name, or a value out of range.
-        TypeError: A model or loss that is neither a name nor the right kind of object.
+        ValueError: Unknown model, loss, measure or parameter name, a value out of range, or a loss of the wrong form.
+        TypeError: A table, model or loss that is neither a name nor the right kind of object.
     """
+    _check_table(table)
+    minimised = named_loss(loss)
+    if minimised.name not in LOSSES:
+        with jax.enable_x64(True):
+            check_loss(minimised, table.channels)
     options: dict[str, Any] = {
-        "loss": named_loss(loss),
+        "loss": minimised,
         "measure": measure,
         "max_angle": max_angle,
         "fixed": fixed or {},
@@ -199,7 +204,6 @@ def _fit(
     effort: Effort,
 ) -> Fit:
     """As :func:`fit`, with settings that are known."""
-    _check_table(table)
     cls = model_class(model, (not table.isotropic) if anisotropic is None else anisotropic)
     held: Named = {n: np.asarray(v, float) for n, v in fixed.items()}
     given = _given_start(cls, model, start, table)

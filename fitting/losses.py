@@ -143,6 +143,25 @@ LOSSES: dict[str, Loss] = {
 """Every named loss, in the order reports show them after the perceptual one, which ranks fits."""
 
 
+def check_loss(loss: Loss, channels: int) -> None:
+    """Raises ValueError if a loss does not take predicted and measured values ``[n, C]`` and a geometry ``[n]``, or does not
+    return one or more residuals a cell, ``[n]`` or ``[n, m]``.
+    """
+    n = 97  # no number that channels or residuals of a cell are likely to have
+    values, one = jax.ShapeDtypeStruct((n, channels), float), jnp.ones(n)
+    g = Geometry(one, one, one, 0 * one, one, 0 * one)
+    try:
+        shape = jax.eval_shape(lambda p, m: jnp.asarray(loss(p, m, g)), values, values).shape
+    except Exception as fault:
+        what = next(iter(str(fault).splitlines()), type(fault).__name__)
+        raise ValueError(f"loss {loss.name!r} cannot take values [n, {channels}] and a geometry [n]: {what}") from fault
+    if len(shape) not in (1, 2) or shape[0] != n or n in shape[1:]:
+        got = str(list(shape)).replace(str(n), "n")
+        raise ValueError(
+            f"loss {loss.name!r} returns {got} of values [n, {channels}]: it must return a residual for each cell"
+        )
+
+
 def named_loss(loss: str | Loss | LossFunction) -> Loss:
     """The loss of a name or of a function. Raises ValueError for an unknown name, TypeError for anything else."""
     if isinstance(loss, Loss):

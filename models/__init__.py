@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from difflib import get_close_matches
+
 import numpy as np
 from jaxtyping import ArrayLike
 
@@ -84,10 +86,12 @@ MODELS: dict[str, tuple[type[BRDF], ...]] = {
 
 def variants(name: str) -> tuple[type[BRDF], ...]:
     """The classes that go by a name: of :data:`MODELS`, effects joined by ``+`` (see :func:`compose`), with switches or
-    without (see :func:`.effects.switchable`), or blocks of a microfacet model (see :func:`brdfit.microfacet`).
+    without (see :func:`.effects.switchable`), or blocks of a microfacet model (see :func:`brdfit.microfacet`). Spaces and
+    capitals do not count.
 
     Raises ValueError for any other name, and for effects that do not go together.
     """
+    given, name = name, "".join(name.split()).lower()
     if name in MODELS:
         return MODELS[name]
     if name.startswith("switchable("):
@@ -96,7 +100,9 @@ def variants(name: str) -> tuple[type[BRDF], ...]:
         return (compose(*name.split("+")),)
     if name.startswith("microfacet("):
         return (by_name(name),)
-    raise ValueError(f"unknown model {name!r}: choose from {', '.join(MODELS)}, or join effects by +: {', '.join(EFFECTS)}")
+    if close := get_close_matches(name, [*MODELS, *EFFECTS]):
+        raise ValueError(f"unknown model {given!r}: did you mean {' or '.join(close)}?")
+    raise ValueError(f"unknown model {given!r}: choose from {', '.join(MODELS)}, or join effects by +: {', '.join(EFFECTS)}")
 
 
 def model(name: str, **parameters: ArrayLike) -> BRDF:

@@ -46,7 +46,10 @@ def by_name(name: str) -> type[Composition]:
     """The class that :func:`microfacet` gives the name. Raises ValueError if it is no such name, and as that does."""
     match = _NAME.fullmatch(name)
     if not match:
-        raise ValueError(f"{name!r} is no microfacet model: write microfacet(ndf,masking,fresnel,body)")
+        raise ValueError(
+            f"{name!r} is no microfacet model: name all four parts, microfacet(ndf,masking,fresnel,body), as in "
+            "microfacet(ggx,smith,schlick,lambert)"
+        )
     return microfacet(*match.groups())
 
 

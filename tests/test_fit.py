@@ -14,6 +14,7 @@ import pytest
 from brdfit.data.synthetic import Floor, Missing, Relative, generate, scattered
 from brdfit.fitting.batch import fit_many
 from brdfit.fitting.result import from_record
+from brdfit.models import variants
 from brdfit.models.base import BRDF, parameter
 from brdfit.models.ward import Ward
 from brdfit.tables.table import table as make_table
@@ -174,7 +175,14 @@ def test_an_anisotropic_model_needs_the_azimuth():
 @pytest.mark.parametrize(
     ("options", "error", "text"),
     [
-        ({"model": "wrad"}, ValueError, "unknown model 'wrad': choose from gtr, abc"),
+        ({"model": "wrad"}, ValueError, r"unknown model 'wrad': did you mean ward\?"),
+        ({"model": "minnaert"}, ValueError, "unknown model 'minnaert': choose from gtr, abc"),
+        (
+            {"loss": lambda p, m, g: jnp.sum(p - m)},
+            ValueError,
+            r"returns \[\] of values \[n, 3\]: it must return a residual",
+        ),
+        ({"loss": lambda p, m, g: (p - m) * g.cos_i}, ValueError, r"cannot take values \[n, 3\] and a geometry \[n\]: .*"),
         ({"model": 3}, TypeError, "a model is a name, a brdfit.BRDF or a subclass"),
         ({"loss": "lgo"}, ValueError, "unknown loss 'lgo'"),
         ({"measure": "area"}, ValueError, "unknown measure 'area'"),
@@ -249,6 +257,12 @@ def test_preparing_is_told_by_every_fit_that_shares_it():
     table, _ = noisy(seed=9)
     fits = list(brdfit.fit_many(table, ("ward", "lambert")))
     assert fits[0].seconds["prepare"] == fits[1].seconds["prepare"] > 1e-4, "reading 1e5 values takes longer than that"
+
+
+def test_spaces_and_capitals_of_names_do_not_count():
+    assert variants("GGX") == variants("ggx")
+    assert variants("Microfacet(ggx, smith, schlick, lambert)") == variants("microfacet(ggx,smith,schlick,lambert)")
+    assert variants("body + lobe") == variants("body+lobe")
 
 
 def test_warnings():
