@@ -238,13 +238,17 @@ class _Search:
                 return self.better(way[-1], self.widest(way[-1]))
         return way[-1]
 
+    def wider(self, t: Tried) -> Effects:
+        """The effects of a set with all others that leave it a way back."""
+        effects = frozenset(t.effects)
+        for n in self.among:
+            if n not in effects and possible(effects | {n}) and EFFECTS[n].neutral(t.fitted.values, effects) is not None:
+                effects |= {n}
+        return effects
+
     def widest(self, t: Tried) -> Tried:
         """All effects, or those of a set with all that can only add to them, whichever is better."""
-        nested = frozenset(t.effects)
-        for n in self.among:
-            if n not in nested and possible(nested | {n}) and EFFECTS[n].neutral(t.fitted.values, nested) is not None:
-                nested |= {n}
-        sets = list(dict.fromkeys((frozenset(self.among), nested)))
+        sets = list(dict.fromkeys((frozenset(self.among), self.wider(t))))
         fits = [self.fit(s, t, *(t for t in [self.known.get(s)] if t)) for s in sets]
         self.known |= {s: Tried(f, self.bench) for s, f in zip(sets, fits, strict=True)}
         return self.better(*(self.known[s] for s in sets))
@@ -313,7 +317,7 @@ class _Search:
         if self.better(chosen, best) is best:
             return best
         # what is compared is not quite what was fitted: the chosen model is one of those, too, with all else at nothing
-        same = Tried(self.bench.extended(best.effects, chosen.fitted), self.bench)
+        same = Tried(self.bench.extended(self.wider(chosen), chosen.fitted), self.bench)
         _ = same.finished
         return same
 

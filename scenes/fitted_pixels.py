@@ -111,7 +111,7 @@ def shown(here: Look) -> Shown:
     wi, wo = np.concatenate([wi.reshape(-1, 3), there]), np.concatenate([wo.reshape(-1, 3), back])
     ambient = None
     if part.everywhere is not None:
-        ambient, at, to = _ambient(part.wo[:, 2], np.asarray(part.everywhere.radiance) * here.exposure)
+        ambient, at, to = _ambient(np.asarray(part.wo)[:, 2], np.asarray(part.everywhere.radiance) * here.exposure)
         wi, wo = np.concatenate([wi, at]), np.concatenate([wo, to])
     with jax.enable_x64(True):
         g: Any = _geometry(wi, wo)
@@ -120,7 +120,9 @@ def shown(here: Look) -> Shown:
     parts: Any = (g, lit, ambient, np.zeros(()), root_weight, (len(pixels), each))
     data = Shown(*parts)
     with jax.enable_x64(True):
-        return eqx.tree_at(lambda d: d.target, data, np.asarray(itp(data.values(f))))
+        target = np.asarray(itp(data.values(jnp.asarray(f))))
+    found: Shown = eqx.tree_at(lambda d: d.target, data, target)
+    return found
 
 
 @program
@@ -155,11 +157,11 @@ def _directions(light: Illumination, alpha: float, channels: int) -> tuple[Reals
             rows += [(w, a / ROUNDS) for w, a in zip(np.asarray(wi), np.asarray(reach), strict=True)]
     if not rows:
         rows = [(np.zeros((len(light.wo), 3)), np.zeros((len(light.wo), channels)))]
-    wi, arriving = (np.stack(x, 1) for x in zip(*rows, strict=True))
+    towards, arriving = (np.stack(x, 1) for x in zip(*rows, strict=True))
     # Guard: below the horizon models are not defined, and 0 * inf = NaN; the normal stands for such directions
     # (tests/test_scenes_screen.py::test_no_direction_below_the_horizon).
-    wi = np.where(arriving.any(-1, keepdims=True), wi, [0.0, 0.0, 1.0])
-    return wi, np.broadcast_to(np.asarray(light.wo)[:, None], wi.shape), arriving
+    towards = np.where(arriving.any(-1, keepdims=True), towards, [0.0, 0.0, 1.0])
+    return towards, np.broadcast_to(np.asarray(light.wo)[:, None], towards.shape), arriving
 
 
 def _cells(table: Table) -> tuple[Reals, Reals]:
