@@ -32,7 +32,7 @@ class Tabulated(NamedTuple):
 def tabulate(model: BRDF) -> Tabulated:
     """Make the tables of polar functions that a model asks for, in float64; none if it asks for none."""
     if any(isinstance(x, jax.core.Tracer) for x in jax.tree.leaves(model)):  # derivatives by parameters, say
-        made = _tables(model)
+        made: list[Any] = _tables(model)
     else:
         with jax.enable_x64(True):
             # NumPy's, as a fit's parameters are: where JAX works in float32 they follow

@@ -305,6 +305,8 @@ def charts(cls: type[BRDF], plain: bool = False) -> tuple[Chart, ...]:
         if issubclass(cls, Composition) and cls.effects:
             chart = _composed_chart(cls)
             return (chart, _composed_chart(cls, narrow=False)) if chart.end else (chart,)
+        if getattr(cls, "blocks", ("",))[0] == "gtr":
+            return tuple(_with_tail(plain_chart(cls), narrow) for narrow in (True, False))
         if cls is ABC:
             return (_abc_chart(),)
         if cls is SGD:

@@ -148,7 +148,7 @@ def check_loss(loss: Loss, channels: int) -> None:
     return one or more residuals a cell, ``[n]`` or ``[n, m]``.
     """
     n = 97  # no number that channels or residuals of a cell are likely to have
-    values, one = jax.ShapeDtypeStruct((n, channels), float), jnp.ones(n)
+    values, one = jnp.ones((n, channels)), jnp.ones(n)
     g = Geometry(one, one, one, 0 * one, one, 0 * one)
     try:
         shape = jax.eval_shape(lambda p, m: jnp.asarray(loss(p, m, g)), values, values).shape

@@ -103,19 +103,9 @@ def _epd(t: float) -> list[Shape]:
     ]
 
 
-def _gtr(t: float) -> list[Shape]:
-    s2 = math.sin(t) ** 2
-    widths = product((1.1, 2.0, 4.0), (0.3, 1.0, 3.0))
-    return [{"alpha": (1 + math.expm1(math.log(2) / g) / (s2 * s * s)) ** -0.5, "gamma": g} for g, s in widths]
-
-
 def _abc(t: float) -> list[Shape]:
     widths = product((0.4, 0.7, 1.0, 1.6, 4.0), (1.0, 0.2))
     return [{"b": math.expm1(math.log(2) / c) / ((1 - math.cos(t)) * s), "c": c} for c, s in widths]
-
-
-def _sgd(t: float) -> list[Shape]:
-    return [{"alpha": max(math.tan(t) ** 2 * s, 1e-7), "p": p} for p, s in product((0.0, 0.7, 1.4), (0.01, 0.2, 1.5))]
 
 
 NDFS: dict[str, Distribution] = {
@@ -185,7 +175,7 @@ NDFS: dict[str, Distribution] = {
         },
         "D = k/(sin^2 theta_h + alpha^2 cos^2 theta_h)^gamma",
         ("burley2012",),
-        _gtr,
+        ndf.GTR.shapes,
     ),
     "abc": Distribution(
         ndf.ABC,
@@ -205,7 +195,7 @@ NDFS: dict[str, Distribution] = {
         },
         "D = exp(-x)/(x^p alpha Gamma(1 - p, alpha) pi cos^4 theta_h), x = alpha + tan^2 theta_h/alpha",
         ("bagher2012",),
-        _sgd,
+        ndf.SGD.shapes,
     ),
 }
 """Distributions of microfacets. Their shared parameters are those of the lobe."""

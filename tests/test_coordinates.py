@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from itertools import product
 
+import brdfit
 import jax
 import jax.numpy as jnp
 import numpy as np
@@ -125,3 +126,14 @@ def test_sgd_keeps_the_product():
         x = jnp.asarray([{"specular": 1e-12, "f0": 0.3, "alpha": -2.0, "p": 0.5}.get(n, 0.1) for n in names])
         back = chart.parameters(x, jnp.zeros(0))
     assert float(back["f0"] * back["specular"]) == pytest.approx(0.3, rel=1e-15)
+
+
+def test_one_formula_is_fitted_one_way():
+    """Put together of blocks it starts where the named model does, in the same coordinates."""
+    blocks = brdfit.microfacet("gtr", "smith", "schlick", "lambert")
+    assert blocks.shapes(0.1) == GTR.shapes(0.1)
+    values = {p.name: np.asarray(0.3) for p in parameters_of(GTR)}
+    for mine, named in zip(charts(blocks), charts(GTR), strict=True):
+        assert [c.name for c in mine.coordinates] == [c.name for c in named.coordinates]
+        with jax.enable_x64(True):
+            np.testing.assert_array_equal(mine.coordinates_of(values, 2), named.coordinates_of(values, 2))

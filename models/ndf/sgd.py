@@ -2,11 +2,13 @@
 
 from __future__ import annotations
 
+from itertools import product
 from typing import ClassVar
 
 import equinox as eqx
 import jax
 import jax.numpy as jnp
+import numpy as np
 from jaxtyping import Array, Float
 
 from ...quadrature import gauss_legendre
@@ -31,6 +33,17 @@ class SGD(eqx.Module):
 
     smith_reach: ClassVar[float] = 15.0
     """See :func:`brdfit.models.masking.smith_lambda`: exp(-tan^2/alpha) ends the integral long before the horizon."""
+
+    @staticmethod
+    def shapes(half_width: float) -> list[dict[str, float]]:
+        """Tails and widths crossed: alpha as D falls to half there, on a logarithmic grid of it."""
+        tan2 = np.tan(half_width) ** 2
+        shapes = []
+        for p, scale in product((-1.0, 0.0, 0.5, 1.0, 1.5, 3.0), (0.1, 1.0, 4.0)):
+            grid = np.exp(np.linspace(np.log(1e-7), np.log(30), 2000))
+            fall = tan2 * scale / grid + p * np.log1p(tan2 * scale / grid**2)
+            shapes.append({"alpha": float(grid[np.argmin(np.abs(fall - np.log(2)))]), "p": p})
+        return shapes + [{"alpha": a, "p": p} for a, p in ((1e-4, 1.2), (1e-3, 1.0), (0.3, 8.0), (2.0, 20.0))]
 
     def reference(self) -> Float[Array, ""]:
         """m."""
