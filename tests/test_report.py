@@ -35,7 +35,7 @@ def test_no_word_for_an_error_that_was_measured_otherwise(tmp_path, changes):
 def test_no_word_for_what_is_nearly_black(tmp_path, fits, evidence):
     """Under a thousandth of the light every error is small and says nothing."""
     shown = evidence.albedo
-    dark = replace(evidence, albedo=replace(shown, measured=shown.measured * 1e-4))
+    dark = replace(evidence, albedo=replace(shown, measured=shown.measured * 1e-4), lobes=None, maps=None, sphere=None)
     text = Reader(write_report(tmp_path, fits, [dark], {}).read_text()).text
     assert re.search(r"Perceptual error 0.0012 \(no word: nearly black, 0.00\d+ % of the light is returned\)", text)
     assert "Dashed" not in text
@@ -47,11 +47,9 @@ def test_sphere_and_ranking_that_disagree_are_said(tmp_path, fits, evidence):
     rows = {f.model_name: evidence.keys.index(fit_key(f)) for f in fits[:2]}
     for ward, gtr, said in ((9.8, 13.0, True), (13.0, 9.8, False), (0.3, 0.4, False)):
         off[rows["ward"]], off[rows["gtr"]] = ward, gtr
-        text = Reader(
-            write_report(
-                tmp_path, fits, [replace(evidence, sphere=replace(evidence.sphere, difference=off))], {}
-            ).read_text()
-        ).text
+        sphere = replace(evidence.sphere, difference=off)
+        alone = replace(evidence, sphere=sphere, lobes=None, maps=None, albedo=None)
+        text = Reader(write_report(tmp_path, fits, [alone], {}).read_text()).text
         assert ("On the sphere below ward comes closest to the material (mean CIEDE2000 9.8; gtr 13)" in text) == said
 
 
