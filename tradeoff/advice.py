@@ -154,7 +154,7 @@ def _exchange_advice(forms: Sequence[Approximation], nothing: str) -> str:
             why = "the error is smaller" if better else "about as good, with fewer operations"
             verdict = f"take {its}, not {mine}: {why}"
         else:
-            why = "the error is larger" if worse else "about as good, but not a tenth fewer operations"
+            why = "the error is larger" if worse else "about as good, but it saves less than a tenth of the operations"
             verdict = f"keep {mine}, not {its}: {why}"
         effect = listed(f"{_signed(v)} ({k})" for k, v in changes.items())
         said.append(
