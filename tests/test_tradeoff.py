@@ -339,8 +339,8 @@ def form(name, own, seconds, error, flops=100.0):
         (
             *(100, 95, 0.0101),
             "keep Smith masking, not V-cavity masking: about as good, but it saves less than a tenth of the operations; "
-            "V-cavity masking takes the same time as far as can be told (\u22125.0 % operations), moves 1 value in 100 by more "
-            "than 2.0 % and, fitted again, changes the error by +1.0 %",
+            "V-cavity masking takes the same time as far as can be told (\u22125.0 % operations), moves 1 value in 100 by "
+            "more than 2.0 % and, fitted again, changes the error by +1.0 %",
         ),
         (
             300,
