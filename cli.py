@@ -8,13 +8,12 @@ import os
 import re
 from collections.abc import Sequence
 from dataclasses import replace
-from pathlib import Path
-from tempfile import TemporaryFile
 from typing import TYPE_CHECKING, Any
 
 import click
 
 from .errors import InputError
+from .files import folder
 
 if TYPE_CHECKING:
     from .fitting import Fit
@@ -161,7 +160,7 @@ def fit_command(
         if measure != "solid_angle":
             raise click.UsageError("--scene is a measure itself: leave --measure out", click.get_current_context())
         scene = load_scene(scene_file)
-    out = _writable(out_dir)
+    out = folder(out_dir)
 
     from .environment import environment
     from .fitting import fit_many
@@ -249,7 +248,7 @@ def synth_command(
     for name in names:  # nothing is written if one of them is unknown
         synthetic.material(name)
     parts = [synthetic.Relative(noise)] if noise else []
-    for path in synthetic.write(names, _writable(out_dir), noise=parts, seed=seed):
+    for path in synthetic.write(names, folder(out_dir), noise=parts, seed=seed):
         if not quiet:
             click.echo(str(path))
     return OK
@@ -290,7 +289,7 @@ def stability_command(out_dir: str, draws: int | None, quiet: bool) -> int:
     except ImportError:
         raise InputError("stability needs mpmath for its 40-digit reference: pip install 'brdfit[stability]'") from None
     _keep_programs()
-    out = _writable(out_dir)
+    out = folder(out_dir)
     from .stability.page import write_atlas
 
     page = write_atlas(out, draws, (lambda text: None) if quiet else (lambda text: click.echo(text, err=True)))
@@ -317,7 +316,7 @@ def tradeoff_command(
     table = load(file, angles=angles)
     _keep_programs()
     _checked_names(model or DEFAULT_MODELS, loss)
-    out = _writable(out_dir)
+    out = folder(out_dir)
     from .tradeoff import PIECES, tradeoff, write_tradeoff
 
     with Progress(PIECES, silent=quiet) as progress:
@@ -345,7 +344,7 @@ def scene_command(scene_file: str, file: str, out_dir: str, exr: bool, angles: A
 
     scene = load_scene(scene_file)
     table = load(file, angles=angles)
-    out = _writable(out_dir)
+    out = folder(out_dir)
     with Progress(PIECES, silent=quiet) as progress:
         found = study(table, scene, progress)
     page = write_scene(out, found, exr)
@@ -369,19 +368,6 @@ def _checked_names(models: str, loss: str) -> list[str]:
     if loss not in LOSSES:
         raise click.UsageError(f"unknown loss {loss!r}: choose from {', '.join(LOSSES)}", click.get_current_context())
     return names
-
-
-def _writable(out_dir: str) -> Path:
-    """The directory, made if need be. Raises InputError if nothing can be written there."""
-    out = Path(out_dir)
-    try:
-        out.mkdir(parents=True, exist_ok=True)
-        with TemporaryFile(dir=out):
-            return out
-    except OSError as fault:
-        raise InputError(
-            f"{out_dir}: nothing can be written there ({fault.strerror or fault}); choose another --out"
-        ) from None
 
 
 def _keep_programs() -> None:

@@ -8,6 +8,7 @@ from collections.abc import Iterator
 from contextlib import contextmanager
 from io import BufferedReader
 from pathlib import Path
+from tempfile import TemporaryFile
 from typing import Any
 
 import numpy as np
@@ -47,7 +48,7 @@ def replacing(path: StrPath) -> Iterator[Path]:
     Raises InputError if the file cannot be written.
     """
     target = Path(path)
-    temporary = target.with_name(f".{uuid.uuid4().hex}.tmp")
+    temporary = target.with_name(f".{uuid.uuid4().hex}.tmp{target.suffix}")  # some libraries go by the suffix
     try:
         yield temporary
         os.replace(temporary, target)
@@ -56,6 +57,19 @@ def replacing(path: StrPath) -> Iterator[Path]:
         raise InputError(f"{path}: cannot be written ({why}); check its directory, permissions and free space") from fault
     finally:
         temporary.unlink(missing_ok=True)
+
+
+def folder(path: StrPath) -> Path:
+    """A directory that can be written to, made if need be. Raises InputError if nothing can be written there."""
+    out = Path(path)
+    try:
+        out.mkdir(parents=True, exist_ok=True)
+        with TemporaryFile(dir=out):
+            return out
+    except OSError as fault:
+        raise InputError(
+            f"{path}: nothing can be written there ({fault.strerror or fault}); choose another directory"
+        ) from None
 
 
 def plain(value: Any) -> Any:
@@ -71,4 +85,4 @@ def plain(value: Any) -> Any:
     return value
 
 
-__all__ = ["StrPath", "plain", "reading", "replacing"]
+__all__ = ["StrPath", "folder", "plain", "reading", "replacing"]

@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING, Any
 from weakref import WeakKeyDictionary
 
 from ..errors import InputError
-from ..files import StrPath, reading, replacing
+from ..files import StrPath, folder, reading, replacing
 from .beside import rendered
 from .evidence import Evidence, load_evidence
 from .page import page
@@ -87,7 +87,8 @@ def write_report(out_dir: StrPath, fits: Sequence[Fit], evidence: Sequence[Evide
 def report(out_dir: StrPath, fits: Fit | Sequence[Fit], tables: Table | Sequence[Table]) -> Path:
     """Write fits of some tables as DIR/fits.json and DIR/report.html, as the command line does; DIR is made if need be.
 
-    Returns the path of the report. Raises ValueError if a fit is of none of the tables.
+    Returns the path of the report. Raises ValueError if a fit is of none of the tables, or if two of them have the same
+    material and source; InputError if nothing can be written there.
     """
     from ..environment import environment
     from ..fitting.result import Fit
@@ -97,11 +98,12 @@ def report(out_dir: StrPath, fits: Fit | Sequence[Fit], tables: Table | Sequence
     fits = [fits] if isinstance(fits, Fit) else list(fits)
     tables = tables if isinstance(tables, Sequence) else [tables]
     known = {(t.material, t.source): t for t in tables}
+    if len(known) < len(tables):
+        raise ValueError("two tables have the same material and source: give each a material of its own")
     for f in fits:
         if (f.material, f.source) not in known:
             raise ValueError(f"no table given for the fit of {f.model_name} to {f.material} ({f.source or 'no source'})")
-    out = Path(out_dir)
-    out.mkdir(parents=True, exist_ok=True)
+    out = folder(out_dir)
     evidence, where = [gather(t, [f for f in fits if (f.material, f.source) == k]) for k, t in known.items()], environment()
     write_fits(out, fits, where)
     save_evidence(out, evidence)

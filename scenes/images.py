@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-from pathlib import Path
 from typing import Any
 
 import numpy as np
@@ -56,14 +55,12 @@ def write_exr(path: StrPath, layers: dict[str, Reals]) -> None:
     library = _library(path)
     pixels = np.concatenate([np.asarray(a, np.float32) for a in layers.values()], -1)
     with replacing(path) as temporary:
-        named = temporary.with_suffix(".exr")  # the format goes by the name
         spec = library.ImageSpec(pixels.shape[1], pixels.shape[0], pixels.shape[2], "half")
         spec.channelnames = tuple(f"{name}.{c}" for name in layers for c in "RGB")
-        out = library.ImageOutput.create(str(named))
-        if out is None or not out.open(str(named), spec) or not out.write_image(np.ascontiguousarray(pixels)):
-            raise InputError(f"{path}: cannot be written ({library.geterror()}); check its directory")
-        out.close()
-        Path(named).rename(temporary)
+        out = library.ImageOutput.create(str(temporary))
+        written = out and out.open(str(temporary), spec) and out.write_image(np.ascontiguousarray(pixels)) and out.close()
+        if not written:
+            raise InputError(f"{path}: cannot be written ({library.geterror()}); check its directory and free space")
 
 
 __all__ = ["read_image", "write_exr"]

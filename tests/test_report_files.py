@@ -115,4 +115,6 @@ def test_report_in_one_call(tmp_path, measured, fits):
     assert fits[0].model_name in alone
     with pytest.raises(ValueError, match="no table given for the fit of"):
         report(tmp_path / "none", fits, [])
+    with pytest.raises(ValueError, match="two tables have the same material"):
+        report(tmp_path / "none", fits, [measured, measured])
     assert not (tmp_path / "none").exists()
