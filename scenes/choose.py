@@ -31,7 +31,7 @@ COST = {
     "diffraction": 5.0,
     "fresnel": 2.0,
     "masking": 1.0,
-    "interreflection": 1000.0,
+    "interreflection": 60.0,
     "trade_off": 4.0,
     "retro": 1.5,
 }

@@ -20,7 +20,7 @@ BEYOND = 1e3
 """Residual, ΔE ITP times the root of a weight, of a model beyond what numbers hold: as bad as can be."""
 
 ROUNDING = 1e-12
-"""Added to the squared length of a column of length 1."""
+"""Squared length of a column of length 1 that is left of it beside others when it counts as made of them."""
 
 
 class Linear:
@@ -64,11 +64,16 @@ def factor(products: Reals) -> Reals:
     """A with A^T A the given products, of columns scaled to one length.
 
     By Cholesky, which takes microseconds: LAPACK's eigenvalues of thirty columns wait for threads a thousand times as long.
+    With pivots, for columns may be alike or, to rounding, without any slope (tests/test_scenes_screen.py::test_factors).
     """
-    # Guard: columns without slope, or alike (tests/test_scenes_screen.py::test_factors).
+    from scipy.linalg.lapack import dpstrf
+
     size = np.sqrt(np.maximum(np.diagonal(products), 1e-300))
-    lower = np.linalg.cholesky(products / (size[:, None] * size) + ROUNDING * np.eye(len(size)))
-    return np.asarray(lower.T * size)
+    lengths, order, rank, _ = dpstrf(products / (size[:, None] * size), tol=ROUNDING)
+    upper = np.zeros_like(products)
+    upper[:, order - 1] = np.triu(lengths)
+    upper[rank:] = 0
+    return np.asarray(upper * size)
 
 
 @program

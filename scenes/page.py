@@ -23,7 +23,7 @@ from .survey import Study
 
 PAGE, NUMBERS, PICTURES = "scene.html", "scene.json", "scene.exr"
 WHY_LEFT_OUT = {
-    "interreflection": "each evaluation would take a hundred times all the rest",
+    "interreflection": "it takes five times as long as all the rest, and with a tail each step of a fit a hundred times",
     "anisotropy": "the table is isotropic",
 }
 TOP = 10.0
