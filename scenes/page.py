@@ -108,6 +108,7 @@ def summary(study: Study) -> str:
     name = MEASURES[limit.measure][1]
     times = choice.everything.nanoseconds / choice.chosen.nanoseconds
     ratio = f"{significant(times, 2)} times as fast" if times >= 1 else f"{significant(1 / times, 2)} times as slow"
+    ratio = "as fast" if 0.95 < times < 1.05 else ratio
     figures = f"{name} {significant(choice.chosen.error)} (tolerance {limit.limit:g})"
     said = f"In this scene {study.table.material} shows {_names(choice.chosen)}: {figures}."
     if not choice.met:

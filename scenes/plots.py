@@ -53,11 +53,12 @@ def ladder(rungs: Sequence[Tried], everything: Tried, tolerance: Tolerance, alt:
         x, y = [t.nanoseconds for t in rungs], [t.error for t in rungs]
         ax.plot(x, y, "-o", color="#0072B2", ms=5.5, lw=1)
         before: set[str] = set()
-        for t in rungs:
+        for k, t in enumerate(rungs):
             new = [n for n in t.effects if n not in before]
             text = " + ".join(new) if not before else "+ " + ", ".join(new)
             before = set(t.effects)
-            ax.annotate(text.replace("_", " "), (t.nanoseconds, t.error), xytext=(7, 5), textcoords="offset points")
+            ax.annotate(text.replace("_", " "), (t.nanoseconds, t.error), xytext=(7, -12 if k % 2 else 5),
+                        textcoords="offset points")  # fmt: skip
         last = rungs[-1]
         ax.plot(last.nanoseconds, last.error, "o", ms=10, mfc="none", mec="#0072B2")
         ax.axhline(tolerance.limit, color="#555555", lw=0.8, ls=(0, (2, 2)))
