@@ -153,7 +153,7 @@ def check_loss(loss: Loss, channels: int) -> None:
     try:
         shape = jax.eval_shape(lambda p, m: jnp.asarray(loss(p, m, g)), values, values).shape
     except Exception as fault:
-        what = next(iter(str(fault).splitlines()), type(fault).__name__)
+        what = f"{type(fault).__name__}: {' '.join(str(fault).split())}"[:200]
         raise ValueError(f"loss {loss.name!r} cannot take values [n, {channels}] and a geometry [n]: {what}") from fault
     if len(shape) not in (1, 2) or shape[0] != n or n in shape[1:]:
         got = str(list(shape)).replace(str(n), "n")

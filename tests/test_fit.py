@@ -353,7 +353,7 @@ def raises(f, m, g):
 def test_many_make_a_result_of_an_exception():
     (fit,) = fit_many([noisy()[0]], ["ward"], loss=raises)
     assert not fit.converged
-    assert fit.reason.startswith("RuntimeError: out of luck entirely")
+    assert fit.reason.endswith("cannot take values [n, 3] and a geometry [n]: RuntimeError: out of luck entirely")
     assert fit.loss == "raises"
 
 
