@@ -149,7 +149,7 @@ def check_loss(loss: Loss, channels: int) -> None:
     """
     n = 97  # no number that channels or residuals of a cell are likely to have
     values, one = jnp.ones((n, channels)), jnp.ones(n)
-    g = Geometry(one, one, one, 0 * one, one, 0 * one)
+    g = Geometry(one, one, one, 0 * one, one, 0 * one, 0 * one, 0 * one)  # with the azimuth that anisotropic tables have
     try:
         shape = jax.eval_shape(lambda p, m: jnp.asarray(loss(p, m, g)), values, values).shape
     except Exception as fault:

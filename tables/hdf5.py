@@ -158,22 +158,12 @@ def _read_layout(path: StrPath, file: h5py.File) -> Layout:
             found[f.name] = bool(group[f.name][()])
         elif f.name in group or f.default is MISSING:
             found[f.name] = _array(path, group, f.name, float)
-    if cls is Scattered:
-        _check_scattered(path, **found)
-    else:
+    if cls is not Scattered:
         _check_axes(path, found)
     try:
         return cls(**found)
     except ValueError as fault:
         raise _odd(path, str(fault)) from None
-
-
-def _check_scattered(
-    path: StrPath, wi: NDArray[np.float64], wo: NDArray[np.float64], measure: NDArray[np.float64], isotropic: bool
-) -> None:
-    n = measure.shape
-    if len(n) != 1 or wi.shape != (*n, 3) or wo.shape != (*n, 3):
-        raise _odd(path, f"wi {wi.shape}, wo {wo.shape} and measure {n} are not [n, 3], [n, 3] and [n]")
 
 
 def _check_axes(path: StrPath, found: dict[str, NDArray[np.float64]]) -> None:

@@ -151,13 +151,14 @@ class Scattered:
 
     def __post_init__(self) -> None:
         """Check what a fit takes for granted."""
-        n = len(self.wi)
+        n = self.measure.shape
+        if len(n) != 1 or self.wi.shape != (*n, 3) or self.wo.shape != (*n, 3):
+            raise ValueError(f"wi {self.wi.shape}, wo {self.wo.shape} and measure {n} are not [n, 3], [n, 3] and [n]")
         for name, w in (("wi", self.wi), ("wo", self.wo)):
-            if w.shape != (n, 3) or not (np.abs(np.einsum("nk,nk->n", w, w) - 1) <= 2e-6).all():
-                raise ValueError(f"{name} must be {n} unit vectors of shape ({n}, 3)")
-        m = self.measure
-        if m.shape != (n,) or not (np.isfinite(m) & (m >= 0)).all() or (n > 0 and not m.any()):
-            raise ValueError(f"measure must be {n} finite numbers, not negative and not all 0")
+            if not (np.abs(np.einsum("nk,nk->n", w, w) - 1) <= 2e-6).all():
+                raise ValueError(f"{name} must be unit vectors")
+        if not (np.isfinite(self.measure) & (self.measure >= 0)).all() or (self.measure.size and not self.measure.any()):
+            raise ValueError("measure must be finite numbers, not negative and not all 0")
 
     @property
     def shape(self) -> tuple[int, ...]:

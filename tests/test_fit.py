@@ -13,6 +13,7 @@ import numpy as np
 import pytest
 from brdfit.data.synthetic import Floor, Missing, Relative, generate, scattered
 from brdfit.fitting.batch import fit_many
+from brdfit.fitting.losses import check_loss, named_loss
 from brdfit.fitting.result import from_record
 from brdfit.models import variants
 from brdfit.models.base import BRDF, parameter
@@ -257,6 +258,11 @@ def test_preparing_is_told_by_every_fit_that_shares_it():
     table, _ = noisy(seed=9)
     fits = list(brdfit.fit_many(table, ("ward", "lambert")))
     assert fits[0].seconds["prepare"] == fits[1].seconds["prepare"] > 1e-4, "reading 1e5 values takes longer than that"
+
+
+def test_a_loss_may_ask_for_the_azimuth_where_there_is_one():
+    """The form of a loss is checked on a geometry that has all that those of tables have."""
+    check_loss(named_loss(lambda p, m, g: (p - m) * sum(g.tangential())[:, None]), 3)
 
 
 def test_spaces_and_capitals_of_names_do_not_count():

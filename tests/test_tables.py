@@ -192,9 +192,9 @@ def test_measurements_become_a_table():
         ({"wi": UP * np.nan}, "wi must be unit vectors"),
         ({"values": np.ones((2, 2, 2))}, "values must have shape"),
         ({"values": []}, "values must have shape"),
-        ({"measure": [1, 2, 3]}, "measure must be 4"),
-        ({"measure": [1, 2, 3, -1]}, "measure must be 4"),
-        ({"measure": np.zeros(4)}, "measure must be 4"),
+        ({"measure": [1, 2, 3]}, r"wo \(4, 3\) and measure \(3,\) are not \[n, 3\], \[n, 3\] and \[n\]"),
+        ({"measure": [1, 2, 3, -1]}, "measure must be finite numbers, not negative and not all 0"),
+        ({"measure": np.zeros(4)}, "measure must be finite numbers, not negative and not all 0"),
         ({"channel_names": ("a", "b")}, "2 channel names for 1"),
     ],
 )
@@ -204,13 +204,16 @@ def test_measurements_that_do_not_agree(wrong, says):
         measurements(given.pop("wi"), given.pop("wo"), given.pop("values"), **given)
 
 
-@pytest.mark.parametrize("measure", [np.zeros(4), -np.ones(4), np.array([1, 1, np.nan, 1]), np.ones(3)])
+@pytest.mark.parametrize("measure", [np.zeros(4), -np.ones(4), np.array([1, 1, np.nan, 1])])
 def test_scattered_samples_count_for_what_they_say(measure):
-    with pytest.raises(ValueError, match="measure must be 4"):
+    with pytest.raises(ValueError, match="measure must be finite numbers, not negative and not all 0"):
         Scattered(UP, UP, measure)
 
 
 def test_scattered_directions_are_unit_vectors():
-    for wrong in (2 * UP, UP[:2], UP * np.nan):
-        with pytest.raises(ValueError, match="wo must be 4 unit vectors"):
+    for wrong in (2 * UP, UP * np.nan):
+        with pytest.raises(ValueError, match="wo must be unit vectors"):
             Scattered(UP, wrong, np.ones(4))
+    for shapes in ((UP, UP[:2], np.ones(4)), (UP, UP, np.ones(3)), (UP[0], UP, np.ones(4)), (UP, UP, np.ones(()))):
+        with pytest.raises(ValueError, match=r"are not \[n, 3\], \[n, 3\] and \[n\]"):
+            Scattered(*shapes)
