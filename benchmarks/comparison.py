@@ -24,7 +24,7 @@ from brdfit.fitting import Effort
 from brdfit.models import MODELS
 from comparison_page import LOSSES, write
 
-USUAL = Effort(path="compressed", starts=3, rtol=1e-5, error_bars=False)
+USUAL = Effort(path="compressed", starts=3, rtol=1e-5, error_bars=False, errors="rows")
 """Settings of nearly all models: all their starting shapes, three of them polished."""
 COSTLY = replace(USUAL, nodes=5, shapes=0.5, starts=1, rtol=1e-4)
 """Settings of the models whose passes over the table take five times those of the others, and more."""

@@ -5,6 +5,7 @@ from __future__ import annotations
 from dataclasses import dataclass
 
 PATHS = ("auto", "compressed", "exact")
+ERRORS = ("cells", "rows")
 
 
 @dataclass(frozen=True)
@@ -34,10 +35,18 @@ class Effort:
     error_bars: bool = True
     """Whether every cell is asked at the end how sure the parameters are and whether the compressed table was good enough:
     a third to half of a fit. Without, all of that is NaN and the path never changes; errors are still of all cells."""
+    errors: str = "cells"
+    """``"cells"``: errors are those of all cells, under every named loss. ``"rows"``, of a fit that ends on the compressed
+    table and has no error bars: as its rows have it, under the loss that was fitted alone, the others NaN. It takes half off
+    what is left of a fit; docs/comparison.md says how far that error is from the one of all cells."""
 
     def __post_init__(self) -> None:
         if self.path not in PATHS:
             raise ValueError(f"effort: unknown path {self.path!r}: choose from {', '.join(PATHS)}")
+        if self.errors not in ERRORS:
+            raise ValueError(f"effort: unknown errors {self.errors!r}: choose from {', '.join(ERRORS)}")
+        if self.errors == "rows" and self.error_bars:
+            raise ValueError("effort: error bars ask every cell, which gives the errors of all: errors='rows' is without")
         if self.nodes < 2:
             raise ValueError(f"effort: nodes must be at least 2, not {self.nodes}")
         if not 0 < self.cells <= 1:
@@ -52,4 +61,4 @@ class Effort:
 
 DEFAULT = Effort()
 
-__all__ = ["DEFAULT", "PATHS", "Effort"]
+__all__ = ["DEFAULT", "ERRORS", "PATHS", "Effort"]

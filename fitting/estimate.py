@@ -64,19 +64,33 @@ class Judgement:
     """Share of the error that this step would take off."""
 
 
-def judge(problem: Problem, x: Reals, box: Box, losses: tuple[Loss, ...], error_bars: bool = True) -> Judgement:
-    """Parameters, their covariances and the errors at an optimum (one pass over all cells)."""
+def judge(
+    problem: Problem, x: Reals, box: Box, losses: tuple[Loss, ...], error_bars: bool = True, cost: float | None = None
+) -> Judgement:
+    """Parameters, their covariances and the errors at an optimum (one pass over all cells); or, without error bars, the one
+    error that ``cost``, of the compressed table, amounts to.
+    """
     n = problem.size
     if not error_bars:
         u = unknown(n)
         estimate = _estimate(problem, x, box, u)
         model = problem.chart.cls(**estimate.parameters)
-        return Judgement(estimate, np.asarray(errors_of(model, problem.samples, losses)), u.shift, u.gain)
+        errors = errors_of(model, problem.samples, losses) if cost is None else _error_of_rows(problem, losses, cost)
+        return Judgement(estimate, np.asarray(errors), u.shift, u.gain)
     halves = in_threads(lambda span: _statistics(problem, x, losses, span), Span.halves(problem.samples))
     found = jax.tree.map(lambda *parts: np.sum(parts, 0), *halves)
     bands = found.bands.reshape(-1, n + 1, n + 1)
     u = uncertainty(bands, found.middle, np.asarray(box.free) & (x > box.lower) & (x < box.upper))
     return Judgement(_estimate(problem, x, box, u), np.sqrt(found.sums[:, 0] / found.sums[:, 1]), u.shift, u.gain)
+
+
+def _error_of_rows(problem: Problem, losses: tuple[Loss, ...], cost: float) -> Reals:
+    """sqrt(cost / sum w) under the loss that was fitted, NaN under the others."""
+    nodes = problem.samples.nodes
+    assert nodes is not None
+    relative = problem.loss.weight(nodes.geometry)
+    total = problem.channels * float(np.sum(nodes.weight if relative is None else nodes.weight * relative))
+    return np.array([np.sqrt(cost / total) if loss.name == problem.loss.name else np.nan for loss in losses])
 
 
 def _estimate(problem: Problem, x: Reals, box: Box, u: Uncertainty) -> Estimate:

@@ -288,9 +288,12 @@ def settle(found: list[Found], whole: Problem, losses: tuple[Loss, ...], effort:
         x = np.concatenate([np.asarray(f.minimum.x) for f in found])
         boxes = [(f.box.lower, f.box.upper, f.box.free) for f in found]
         box = Box(*(np.concatenate([np.asarray(b) for b in side]) for side in zip(*boxes, strict=True)))
-        return judge(whole, x, box, losses, effort.error_bars)
+        cost = sum(float(f.minimum.cost) for f in found) if by_rows else None
+        return judge(whole, x, box, losses, effort.error_bars, cost)
 
-    found = [replace(f, passes=f.passes + 1) for f in found]
+    by_rows = effort.errors == "rows" and not any(f.exact for f in found)
+    if not by_rows:
+        found = [replace(f, passes=f.passes + 1) for f in found]
     judgement = judged(found)
     again = False
     for i, shift in enumerate(np.split(judgement.shift, len(found))):

@@ -183,14 +183,18 @@ def channel_rows(
     own, shared = chart.split(x, problem.channels)
     root = _root_weight(loss, g, weight)
 
+    def stacked(rows: list[Array]) -> Array:
+        return jnp.stack([jnp.broadcast_to(a, g.shape) for a in rows])
+
     def one(own_c: Vector, tables_c: _Tables, measured_c: Array) -> tuple[Array, Array]:
         k = len(own_c)
         at = [k + i for i in twice]
         slopes, f = _columns(lambda y: _values(chart, y[:k], y[k:], tables_c, g), [*own_c, *shared], at)
         r, slope, bend = _residual(loss, f, measured_c, g, root)
         first, second = slopes[: len(slopes) - len(at)], slopes[len(slopes) - len(at) :]
-        columns = [d * slope for d in first] + [d2 * slope + bend * first[i] ** 2 for i, d2 in zip(at, second, strict=True)]
-        return jnp.stack([*(jnp.broadcast_to(c, r.shape) for c in columns), r]), f
+        curved = [d2 * slope + bend * first[i] ** 2 for i, d2 in zip(at, second, strict=True)]
+        # all columns times the slope at once: column by column the compiler takes its roots and logarithms anew for each
+        return jnp.concatenate([stacked(first) * slope, stacked([*curved, r])]), f
 
     rows: tuple[Array, Array] = jax.vmap(one, in_axes=(0, 0 if problem.chart.own_lobes else None, 0))(own, tables, measured)
     return rows

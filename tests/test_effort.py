@@ -9,6 +9,7 @@ import numpy as np
 import pytest
 from brdfit import Effort
 from brdfit.data.synthetic import Relative, generate
+from brdfit.fitting.effort import ERRORS
 from brdfit.fitting.result import from_record
 from brdfit.reports.model_section import _agreed
 
@@ -75,6 +76,28 @@ def test_without_error_bars(table):
     assert "Not asked how sure" in _agreed(bare)
     assert "Every cell asked" in _agreed(whole)
     assert json.loads(json.dumps(bare.record()))["stderr"]["alpha"] is None
+
+
+@pytest.mark.parametrize("loss", ["log", "perceptual"])  # without a weight of its own and with one
+def test_errors_by_rows(table, loss):
+    """The error of the fit's own loss as the compressed rows have it, what they leave out included: that of all cells up to
+    what is lost by compression, 1e-3 at most.
+    """
+    by_rows, by_cells = (
+        brdfit.fit(table, "ward", loss=loss, effort=Effort(error_bars=False, errors=e)) for e in ERRORS[::-1]
+    )
+    assert by_rows.errors[loss] == pytest.approx(by_cells.errors[loss], rel=1e-3)
+    assert {name for name, e in by_rows.errors.items() if np.isfinite(e)} == {loss}
+    assert by_rows.passes == by_cells.passes - 1
+    with pytest.raises(ValueError, match="error bars ask every cell"):
+        Effort(errors="rows")
+
+
+def test_errors_of_cells_where_there_are_no_rows(table):
+    """A loss that cannot be compressed, and a search on the cells, end with the errors of all cells under every loss."""
+    for options in ({"loss": "relative"}, {"path": "exact"}):
+        effort = Effort(path=options.pop("path", "auto"), error_bars=False, errors="rows")
+        assert np.isfinite(list(brdfit.fit(table, "ward", effort=effort, **options).errors.values())).all()
 
 
 def test_fewer_starts(table):
