@@ -59,8 +59,7 @@ RANKS = """\
 By loss and for all three: the error over the smallest of any model on the same material, geometric mean over the
 materials; *worst*, the largest such ratio of any material and loss. *Numbers*: parameters of three channels. *At a
 bound*: fits in which a parameter that bends the lobe ends at a bound of its search box; colours at 0 do not count.
-*Fit*: seconds of the search and of the errors over all cells, nothing compiled, as many fits at a time as there are
-cores. *ns*: one pair of directions, three channels, float32, one core. Both are lower quartiles."""
+*Fit*: seconds of the search, nothing compiled, as many fits at a time as there are cores. *ns*: one pair of directions, three channels, float32, one core. Both are lower quartiles."""
 
 SCHLICK = """\
 Their Fresnel factor is Schlick's: it reflects all
@@ -258,7 +257,8 @@ def pareto(c: Comparison, path: Path) -> None:
         for ax, kind in zip(axes.ravel(), kinds, strict=False):
             models = [m for m in c.models if m not in SAME_AS]
             points = [(c.cost[m], c.typical(m, LOSSES[0], kind)) for m in models]
-            if not np.isfinite(points).any():
+            if not np.isfinite(points).all(-1).any():
+                ax.axis("off")  # no material of this kind
                 continue
             best = front(points)
             x, y = np.array(points).T

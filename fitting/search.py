@@ -22,6 +22,8 @@ COLOUR_BLOCKS = (2, 1)
 """Blocks of cells, and compressed blocks, for refitting the linear coordinates alone."""
 COARSE_BLOCKS = (6, 3)
 """Blocks of cells, and compressed blocks, for polishing the best shapes."""
+COARSE = 1e-6
+"""Relative decrease of the cost at which that polish ends, or where the whole table's does if that is earlier."""
 FINISHED = 3
 """Distinct optima of the coarse table that are carried to the whole one, at most."""
 ROUGH = 1e-4
@@ -97,7 +99,7 @@ def search(problems: list[tuple[Problem, Box, list[NDArray[np.float64]]]], effor
     blocks = samples.compressed if fast else max(1, round(effort.cells * samples.blocks))
     coarse = (
         Stage.of(part(samples, min(COLOUR_BLOCKS[fast], blocks)), 1e-2, 1e-2, COLOUR_STEPS),
-        Stage.of(part(samples, min(COARSE_BLOCKS[fast], blocks)), 1e-6, 1.0),
+        Stage.of(part(samples, min(COARSE_BLOCKS[fast], blocks)), max(COARSE, effort.rtol), 1.0),
     )
     whole = Stage.of(part(samples, blocks), effort.rtol, 1e-6)
     polished: list[Candidate] = []
