@@ -86,7 +86,7 @@ def run(tables: list[Path], keep: Path) -> tuple[list[Row], float]:
 
 
 def all_cells(rows: list[Row], path: Path) -> list[float]:
-    """How far the errors of a table's fits, which are those of its compressed rows, lie from those of all cells, relative."""
+    """How far the errors of a table's fits, those of its compressed rows, lie from those of all cells, relative."""
     table = brdfit.load(path)
 
     def off(row: Row) -> float:
@@ -109,8 +109,8 @@ def main() -> None:
     off = all_cells(chosen, checked)
     fitting, compiling = (sum(r[k] for r in chosen) / 60 for k in ("seconds", "compile"))
     settings = (
-        f"Fits are made of rows compressed along phi_d, {USUAL.starts} starts polished, to a relative decrease of the cost of "
-        f"{USUAL.rtol:g}; for {', '.join(f'`{m}`' for m in EFFORT)}, whose passes take longest, {COSTLY.starts} of half as "
+        f"Fits are made of rows compressed along phi_d, {USUAL.starts} starts polished, to a relative decrease of the cost "
+        f"of {USUAL.rtol:g}; for {', '.join(f'`{m}`' for m in EFFORT)}, whose passes take longest, {COSTLY.starts} of half as "
         f"many shapes, with half as many nodes a row, to {COSTLY.rtol:g}. Errors are those of the compressed rows: of the "
         f"{len(off)} fits of {checked.stem} half are within {np.median(off):.1g} of the error of all cells and all within "
         f"{max(off):.1g}. The fits took {fitting:.0f} minutes and what compiled for them {compiling:.1f}, with as many fits "
