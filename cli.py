@@ -149,10 +149,12 @@ def fit_command(
     from .tables import load
 
     files = tuple(dict.fromkeys(files))
+    isotropic = []
     for path in files:  # nothing is fitted or written if one of them cannot be used
         kept = {path: load(path, angles=angles)}
+        isotropic += [path] if kept[path].isotropic else []
     _keep_programs()
-    names = _checked_names(models, loss)
+    names = _checked_names(models, loss, isotropic)
     scene = None
     if scene_file is not None:
         from .scenes import load_scene, weighted
@@ -315,7 +317,7 @@ def tradeoff_command(
 
     table = load(file, angles=angles)
     _keep_programs()
-    _checked_names(model or DEFAULT_MODELS, loss)
+    _checked_names(model or DEFAULT_MODELS, loss, [file] if table.isotropic else [])
     out = folder(out_dir)
     from .tradeoff import PIECES, tradeoff, write_tradeoff
 
@@ -353,8 +355,13 @@ def scene_command(scene_file: str, file: str, out_dir: str, exr: bool, angles: A
     return OK if found.choice.met else SOME_FAILED
 
 
-def _checked_names(models: str, loss: str) -> list[str]:
-    """The models of a list with commas, once each. Raises UsageError for an unknown name of a model or loss."""
+def _checked_names(models: str, loss: str, isotropic: Sequence[str]) -> list[str]:
+    """The models of a list with commas, once each.
+
+    Raises UsageError for an unknown name of a model or loss, InputError for a model without an isotropic form if there are
+    ``isotropic`` files.
+    """
+    from .fitting.fit_table import check_azimuth
     from .fitting.losses import LOSSES
     from .models import variants
 
@@ -367,6 +374,9 @@ def _checked_names(models: str, loss: str) -> list[str]:
         raise click.UsageError(str(fault), click.get_current_context()) from None
     if loss not in LOSSES:
         raise click.UsageError(f"unknown loss {loss!r}: choose from {', '.join(LOSSES)}", click.get_current_context())
+    for path in isotropic:
+        for name in names:
+            check_azimuth(variants(name)[0], path)
     return names
 
 

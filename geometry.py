@@ -160,6 +160,17 @@ class Geometry(eqx.Module):
             raise ValueError("an anisotropic model needs the azimuth of the half vector, and this table is isotropic")
         return self.h_x2, self.h_y2
 
+    def directions(self) -> tuple[Float[Array, "... 3"], Float[Array, "... 3"]]:
+        """Unit vectors to the light and the viewer.
+
+        Raises ValueError on isotropic tables, which do not have them.
+        """
+        if self.light is None or self.viewer is None:
+            raise ValueError(
+                "this model needs the directions themselves, which geometry of an isotropic table does not have"
+            )
+        return self.light, self.viewer
+
     def slopes(self) -> tuple[Field, Field]:
         """Squared slopes of h along tangent and bitangent, h_x^2/h_z^2 and h_y^2/h_z^2; raises as :meth:`tangential`."""
         x2, y2 = self.tangential()

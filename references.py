@@ -35,6 +35,8 @@ REFERENCES: dict[str, str] = {
     "walter2007": "Walter, B., Marschner, S. R., Li, H., Torrance, K. E. (2007). Microfacet models for refraction "
     "through rough surfaces. Eurographics Symposium on Rendering, 195-206. "
     "doi:10.2312/EGWR/EGSR07/195-206",
+    "poulin1990": "Poulin, P., Fournier, A. (1990). A model for anisotropic reflection. Computer Graphics (Proc. SIGGRAPH) "
+    "24(4), 273-282. doi:10.1145/97880.97909",
     "blinn1977": "Blinn, J. F. (1977). Models of light reflection for computer synthesized pictures. Computer Graphics"
     " (Proc. SIGGRAPH) 11(2), 192-198. doi:10.1145/965141.563893",
     "schwenk2011": "Schwenk, K. (2011). A survey of shading models for real-time rendering.",

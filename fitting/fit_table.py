@@ -15,6 +15,7 @@ import numpy as np
 from jaxtyping import ArrayLike
 from numpy.typing import NDArray
 
+from ..errors import InputError
 from ..models import BRDF, channels, parameter_values, parameters_of, variants
 from ..tables import Table
 from .coordinates import Chart, charts, into
@@ -112,6 +113,15 @@ def model_class(model: Model, anisotropic: bool) -> type[BRDF]:
     return cls
 
 
+def check_azimuth(cls: type[BRDF], where: str) -> None:
+    """Raise InputError for an anisotropic model; ``where`` names an isotropic table that it is to be fitted to."""
+    if cls.anisotropic:
+        raise InputError(
+            f"{where}: an anisotropic model needs the azimuth of the half vector, and this table is isotropic: fit "
+            f"{_name(cls)} to an anisotropic table, or another model to this one"
+        )
+
+
 def fit(
     table: Table,
     model: Model = "gtr",
@@ -154,9 +164,13 @@ def fit(
 
     Raises:
         ValueError: Unknown model, loss, measure or parameter name, a value out of range, or a loss of the wrong form.
+        InputError: An anisotropic model, and the table is isotropic.
         TypeError: A table, model or loss that is neither a name nor the right kind of object.
     """
     _check_table(table)
+    cls = model_class(model, (not table.isotropic) if anisotropic is None else anisotropic)
+    if table.isotropic:
+        check_azimuth(cls, table.source or table.material)
     minimised = named_loss(loss)
     if minimised.name not in LOSSES:
         with jax.enable_x64(True):
@@ -173,7 +187,6 @@ def fit(
     }
     if tolerance is None and time_budget is None:
         return _fit(table, model, effort=effort, **options)
-    cls = model_class(model, (not table.isotropic) if anisotropic is None else anisotropic)
     cells = int(prepare(table, max_angle, measure, options["loss"]).used.sum())
     chosen = plan(_name(cls), cells, tolerance, time_budget)
     spent = {"compile": 0.0, "solve": 0.0}

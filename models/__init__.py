@@ -32,6 +32,7 @@ from .modified_phong import ModifiedPhong
 from .oren_nayar import OrenNayar, OrenNayarFull
 from .pbr import PBR
 from .phong import Phong
+from .poulin_fournier import PoulinFournier
 from .schlick import Schlick, SchlickTwoLayers
 from .schwenk import Schwenk
 from .sgd import SGD
@@ -80,8 +81,9 @@ MODELS: dict[str, tuple[type[BRDF], ...]] = {
     "granier_heidrich": (GranierHeidrich,),
     "htsg": (HTSG,),
     "stam_diffraction": (StamDiffraction,),
+    "poulin_fournier": (PoulinFournier,),
 }
-"""Every named model: its isotropic form first, then the anisotropic one where there is one."""
+"""Every named model: its isotropic form first, then the anisotropic one where there is one. One has no isotropic form."""
 
 
 def variants(name: str) -> tuple[type[BRDF], ...]:

@@ -14,6 +14,11 @@ from .diffuse import lambert
 from .ndf.power_cosine import log_cosine
 
 
+def half_vector_scale(exponent: Float[Array, ""]) -> Float[Array, ""]:
+    """(e + 2)(e + 4)/(8 pi (2^(-e/2) + e)), of which (n.h)^e has the albedo 1 at normal incidence."""
+    return (exponent + 2) * (exponent + 4) / (8 * jnp.pi * (jnp.exp2(-exponent / 2) + exponent))
+
+
 class ModifiedBlinnPhong(BRDF):
     """f = diffuse/pi + specular (e + 2)(e + 4)/(8 pi (2^(-e/2) + e)) (n.h)^e (Schwenk 2011, eq. 28).
 
@@ -39,5 +44,4 @@ class ModifiedBlinnPhong(BRDF):
     def evaluate(self, g: Geometry) -> Float[Array, "..."]:
         """Value in 1/sr."""
         e = self.exponent
-        scale = (e + 2) * (e + 4) / (8 * jnp.pi * (jnp.exp2(-e / 2) + e))
-        return lambert(self.diffuse) + self.specular * (scale * jnp.exp(e * log_cosine(g.sin2_h, g.cos2_h)))
+        return lambert(self.diffuse) + self.specular * (half_vector_scale(e) * jnp.exp(e * log_cosine(g.sin2_h, g.cos2_h)))

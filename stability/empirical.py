@@ -12,7 +12,7 @@ from typing import Any
 
 from mpmath import mp, mpf
 
-from . import microfacets, oracle
+from . import cylinders, microfacets, oracle
 
 Vector = Sequence[Any]
 
@@ -316,6 +316,7 @@ MODELS: dict[str, Callable[..., Any]] = {
     "ModifiedBlinnPhong": modified_blinn_phong,
     "Schlick": schlick,
     "SchlickTwoLayers": schlick_two_layers,
+    "PoulinFournier": cylinders.poulin_fournier,
     **{name: _normalised(model) for name, model in _OF_UNIT_VECTORS.items()},
 }
 """By the name of the class under test: functions of directions and, by name, parameters."""

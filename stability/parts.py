@@ -115,6 +115,10 @@ def _geometry(y: Array) -> Geometry:
     return from_sums(y[:3], y[3:6], y[6], y[7])
 
 
+def _with_directions(y: Array) -> Geometry:
+    return replace(_geometry(y), light=(y[:3] + y[3:6]) / 2, viewer=(y[:3] - y[3:6]) / 2)
+
+
 def _sine_cosine(x: Array) -> Array:
     return jnp.concatenate([jnp.sin(x), jnp.cos(x)])
 
@@ -181,14 +185,24 @@ def normal_incidence(points: Reals) -> NDArray[np.bool_]:
     return found
 
 
+def abreast(points: Reals) -> NDArray[np.bool_]:
+    """Where light and viewer are equally steep across the tangent, and the lower of them hides what the other does."""
+    found: NDArray[np.bool_] = np.abs(points[:, -5] * points[:, -1] - points[:, -2] * points[:, -4]) < 1e-6
+    return found
+
+
 KINKS: dict[str, Mask] = {
     **dict.fromkeys(("abc", "ashikhmin_shirley", "low_microfacet", "max_phong"), level),
     **dict.fromkeys(("cook_torrance", "cook_torrance_blinn", "cook_torrance_gaussian"), level),
     **dict.fromkeys(("oren_nayar", "oren_nayar_full"), crease),
     "strauss": upright,
     "epd": cusp,
+    "poulin_fournier": abreast,
 }
 """By model: those that are not here are smooth."""
+
+DIRECTED = ("poulin_fournier",)
+"""Models that ask for the directions themselves."""
 
 _SMALLEST = {"strauss": (1e-30, 1e-20), "schwenk": (1e-280, 1e-40)}
 """Models that may be black because of a reflectance of 0, or because the square of a smoothness is."""
@@ -202,13 +216,14 @@ SLOW = (*INTEGRALS[:3], "htsg", "stam_diffraction")
 def _model(cls: type[models.BRDF]) -> Part:
     specs = parameters_of(cls)
     count = len(specs)
+    geometry = _with_directions if cls.name in DIRECTED else _geometry
 
     def whole(x: Array) -> Array:
         numbers = {p.name: x[k][None] if p.per_channel else x[k] for k, p in enumerate(specs)}
         return cls(**numbers)(x[count : count + 3], x[count + 3 :])[0]
 
     def formula(y: Array) -> Array:
-        g = _geometry(y[count:])
+        g = geometry(y[count:])
         return jnp.broadcast_to(cls(**{p.name: y[k] for k, p in enumerate(specs)}).evaluate(g), g.shape)
 
     ranges = domain.ranges_of(specs, cls.name)

@@ -323,6 +323,18 @@ SURFACES = [
 ]
 LAYERED = {"diffuse": 0.1, "specular": 0.3, "ior": 1.5, "thickness": 0.2, "exponent": 50.0, "base_exponent": 20.0}
 FILMS = [{"thickness": 0.0}, {"thickness": 3.0}, {"ior": 1.001}, {"ior": 4.0}, {"exponent": 1e6}, {"base_exponent": 1e6}]
+CYLINDERS = {"diffuse": 0.1, "specular": 0.2, "exponent": 50.0, "spacing": 2.6, "elevation": 0.3}
+PROFILES = [
+    {"elevation": -1.0},
+    {"elevation": 1.0, "spacing": 2.01},
+    {"elevation": -0.4, "exponent": 1e7, "spacing": 2.1},
+    {"exponent": 0.0, "spacing": 2.05},
+    {"exponent": 0.3, "elevation": 0.9, "diffuse": 0.0},
+    {"spacing": 100.0, "elevation": 1.0},
+]
+FULL_PROFILES = [
+    {"diffuse": 0.0, "specular": 1.0, "exponent": e, "elevation": h} for e, h in ((0.0, 1.0), (5.0, 0.0), (60.0, -0.5))
+]
 
 TABLE: tuple[Row, ...] = (
     _integral("gtr", _gtr()),
@@ -383,6 +395,7 @@ TABLE: tuple[Row, ...] = (
     _row("granier_heidrich", _with(LAYERED, {}, *FILMS), truth={"ior": [1.5, 1.7], "thickness": [0.2, 0.3]}),
     _row("htsg", _with(WAVES, {}, *SURFACES, {"ior": 1.0}, {"ior": 20.0}), grid=(9, 7, 6)),
     _row("stam_diffraction", _with(WAVES, {}, *SURFACES, {"ior": 20.0}), grid=(9, 7, 6)),
+    _row("poulin_fournier", _with(CYLINDERS, {}, *PROFILES), energy=FULL_PROFILES, truth=CYLINDERS, grid=(6, 10, 6, 8)),
 )
 
 
