@@ -110,7 +110,8 @@ def main() -> None:
     fitting, compiling = (sum(r[k] for r in chosen) / 60 for k in ("seconds", "compile"))
     settings = (
         f"Fits are made of rows compressed along phi_d, {USUAL.starts} starts polished, to a relative decrease of the cost "
-        f"of {USUAL.rtol:g}; for {', '.join(f'`{m}`' for m in EFFORT)}, whose passes take longest, {COSTLY.starts} of half as "
+        f"of {USUAL.rtol:g}; for "
+        f"{', '.join(f'`{m}`' for m in EFFORT)}, whose passes take longest, {COSTLY.starts} of half as "
         f"many shapes, with half as many nodes a row, to {COSTLY.rtol:g}. Errors are those of the compressed rows: of the "
         f"{len(off)} fits of {checked.stem} half are within {np.median(off):.1g} of the error of all cells and all within "
         f"{max(off):.1g}. The fits took {fitting:.0f} minutes and what compiled for them {compiling:.1f}, with as many fits "
