@@ -11,14 +11,14 @@ import numpy as np
 import pytest
 from brdfit import cli, models
 from brdfit.angles import unit_vectors
-from brdfit.fitting import Effort
+from brdfit.fitting import Effort, spike
 from brdfit.geometry import from_directions
 from brdfit.models import ndf, parameter_values
 from brdfit.models.masking.smith import NODES, REACH, averted_area
 from brdfit.quadrature import smith_kernel
 from brdfit.stability import oracle
 from brdfit.tabulated import read, tabulate
-from brdfit.tradeoff import advice, approximations, page, rendering, sample, settings, smith, spike, survey, timing
+from brdfit.tradeoff import advice, approximations, page, rendering, sample, settings, smith, survey, timing
 from brdfit.tradeoff.evaluation import Evaluation, Operations, direct
 from brdfit.tradeoff.exchange import COUNTERPART, FRESNELS, MASKINGS, PARTS, exchanged
 from brdfit.tradeoff.pareto import front
@@ -369,11 +369,11 @@ def test_no_time_decides(seconds):
 
 def test_a_spike_is_no_advice(small_table):
     table, _ = small_table
-    highest = spike.highest_peak(table)
+    largest = spike.largest_value(table)
     best = brdfit.fit(table, "ward").model
-    assert not spike.is_spike(best, highest)
+    assert not spike.is_spike(best, largest)
     narrow = models.model("gtr", diffuse=[0.1] * 3, specular=[0.5] * 3, alpha=1e-4, gamma=2.0)
-    assert spike.is_spike(narrow, highest)
+    assert spike.is_spike(narrow, largest)
     assert "Left out: gtr and abc, fitted with a lobe that is a spike" in advice.without_spikes("Take it.", ["gtr", "abc"])
     assert advice.without_spikes("Take it.", []) == "Take it."
 

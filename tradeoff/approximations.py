@@ -11,13 +11,13 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ..fitting import Effort, Fit, fit
+from ..fitting.spike import is_spike, largest_value
 from ..models import BRDF, parameter_values
 from ..tables import Table
 from ..tabulated import read, tabulate
 from .evaluation import Evaluation, Operations, direct
 from .exchange import COUNTERPART, FRESNELS, MASKINGS, PARTS, exchanged
 from .sample import Sample
-from .spike import highest_peak, is_spike
 from .timing import Timing, interleaved
 
 Reals = NDArray[np.float64]
@@ -58,12 +58,12 @@ def approximations(
     programs: dict[tuple[str, str], Evaluation] = {}
     values: dict[tuple[str, str], Reals] = {}
     refits: dict[tuple[str, str], Future[dict[str, float]]] = {}
-    highest = highest_peak(table)
+    largest = largest_value(table)
     with ThreadPoolExecutor(os.cpu_count()) as pool:  # programs are compiled and run outside Python's lock
         for f in fits:
             for k, (form, m) in enumerate(_forms(part, f.model).items()):
                 key = f.model_name, form
-                refits[key] = pool.submit(_refitted, table, m, f, highest) if k else pool.submit(dict, f.errors)
+                refits[key] = pool.submit(_refitted, table, m, f, largest) if k else pool.submit(dict, f.errors)
                 made = tabulate(m)
                 how, what = (read, made) if made.tables else (direct, m)
                 programs[key] = Evaluation(how, what, sample, "float32")
@@ -103,10 +103,10 @@ def _forms(part: str, model: BRDF | None) -> dict[str, BRDF]:
     return {form: exchanged(cls, masking=MASKINGS[form].visibility)(**values) for form in (own, COUNTERPART[own], "none")}
 
 
-def _refitted(table: Table, start: BRDF, like: Fit, highest: float) -> dict[str, float]:
+def _refitted(table: Table, start: BRDF, like: Fit, largest: float) -> dict[str, float]:
     """Errors of a fit that starts at the old parameters: nearby optima are what an exchanged part is judged by."""
     again = fit(table, start, loss=like.loss, measure=like.measure, max_angle=like.max_angle, effort=NEARBY)
-    useful = again.converged and again.model is not None and not is_spike(again.model, highest)
+    useful = again.converged and again.model is not None and not is_spike(again.model, largest)
     return again.errors if useful else {}
 
 

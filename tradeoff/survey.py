@@ -8,6 +8,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from ..fitting import Fit, fit_many
+from ..fitting.spike import is_spike, largest_value
 from ..progress import Progress
 from ..reports.words import SEEN, no_word
 from ..tables import Table
@@ -24,7 +25,6 @@ from .rendering import Rendering, renderings
 from .sample import draw
 from .settings import Setting, settings
 from .smith import Quadrature, quadratures
-from .spike import highest_peak, is_spike
 
 MODELS = ("gtr", "abc", "sgd", "ward", "ashikhmin_shirley", "lambert")
 """What is compared: the models that are fitted by default, and a body without a lobe. All there are would take minutes."""
@@ -90,8 +90,8 @@ def tradeoff(
         progress.advance(f"{f.model_name}: perceptual {f.errors['perceptual']:.5f}, {took}" if f.model else f.reason)
     fits.sort(key=lambda f: list(MODELS).index(f.model_name))
     losses = tuple(dict.fromkeys(("perceptual", loss)))
-    highest = highest_peak(table)
-    spikes = [f.model_name for f in fits if f.model is not None and is_spike(f.model, highest)]
+    largest = largest_value(table)
+    spikes = [f.model_name for f in fits if f.model is not None and is_spike(f.model, largest)]
     advice: dict[str, str] = {}
 
     def advised(question: str, sentence: str) -> None:
