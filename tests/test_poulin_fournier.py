@@ -110,6 +110,7 @@ def test_cylinders_that_touch():
     """
     normal = unit_vectors(np.zeros(2), np.zeros(2))
     at, wider = (measure.evaluate(PART, points((*LOBE, d, 0.3), normal, normal))[1][0, :5] for d in (2.0, 2 + 1e-9))
+    assert np.isfinite(at).all()
     np.testing.assert_allclose(at, wider, rtol=1e-7)
     beside = unit_vectors(np.array([1e-6, 1e-2]), np.full(2, 1.3))
     for exponent in (0.0, 0.4, 1e4):

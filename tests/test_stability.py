@@ -24,7 +24,7 @@ LOOSE = {
     "DisneyAnisotropic": 5e-5,
     "OrenNayarFull": 2e-2,  # slopes between two grazing directions: small differences of large ones
     "Strauss": 5e-5,  # shadowing changes within half a degree of the horizon
-    "PoulinFournier": 2e-2,  # slopes of narrow lobes across the cylinders, of which both flanks nearly cancel
+    "PoulinFournier": 1e-3,  # slopes of narrow lobes across the cylinders, of which both flanks nearly cancel
     "DistributionBased": 2e-4,  # sums of terms of 60 in an exponent
     "HTSG": 5e-4,  # exponents of some thousands
     "StamDiffraction": 2e-4,
