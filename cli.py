@@ -361,7 +361,7 @@ def _checked_names(models: str, loss: str, isotropic: Sequence[str]) -> list[str
     Raises UsageError for an unknown name of a model or loss, InputError for a model without an isotropic form if there are
     ``isotropic`` files.
     """
-    from .fitting.fit_table import check_azimuth
+    from .fitting.given import check_azimuth
     from .fitting.losses import LOSSES
     from .models import variants
 

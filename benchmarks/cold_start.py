@@ -24,8 +24,9 @@ import equinox as eqx
 import jax
 import numpy as np
 from brdfit.fitting.coordinates import charts
-from brdfit.fitting.fit_table import model_class, prepare
+from brdfit.fitting.given import model_class
 from brdfit.fitting.gram import Problem, Span, gram
+from brdfit.fitting.prepared import prepare
 from brdfit.fitting.starts import starts
 from brdfit.programs import OPTIONS
 

@@ -21,8 +21,8 @@ from typing import Any
 import brdfit
 import kept
 import numpy as np
+from brdfit.evaluation import evaluate
 from brdfit.fitting import LOSSES
-from brdfit.reports.evaluate import evaluate
 from brdfit.reports.gather import sphere, sphere_directions
 
 MODELS = ("gtr", "abc", "sgd", "ward", "ashikhmin_shirley")

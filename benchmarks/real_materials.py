@@ -24,7 +24,7 @@ from typing import Any
 import brdfit
 from brdfit.data import published_abc, published_materials, published_sgd
 from brdfit.fitting.effort import Effort
-from brdfit.fitting.fit_table import prepare
+from brdfit.fitting.prepared import prepare
 from brdfit.reports import write_fits
 
 MODELS = ("gtr", "abc", "sgd", "ward", "ashikhmin_shirley")

@@ -29,8 +29,9 @@ import numpy as np
 import optimistix as optx
 import scipy.optimize
 from brdfit.fitting.coordinates import charts
-from brdfit.fitting.fit_table import model_class, prepare
+from brdfit.fitting.given import model_class
 from brdfit.fitting.gram import Problem, Span, gram
+from brdfit.fitting.prepared import prepare
 from brdfit.fitting.search import Stage, solve
 from brdfit.fitting.solver import Box
 from brdfit.fitting.starts import starts

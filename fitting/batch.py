@@ -12,8 +12,10 @@ from ..errors import InputError
 from ..files import StrPath
 from ..tables import Table, load
 from .effort import DEFAULT
-from .fit_table import Model, failed, fit, model_class, prepare
+from .fit_table import failed, fit
+from .given import Model, model_class
 from .losses import named_loss
+from .prepared import prepare
 from .result import Fit
 
 

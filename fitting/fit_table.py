@@ -3,38 +3,43 @@
 from __future__ import annotations
 
 import math
-import threading
 import time
 from collections.abc import Mapping
-from dataclasses import dataclass, replace
+from dataclasses import replace
 from typing import Any, Literal
-from weakref import WeakKeyDictionary
 
 import jax
 import numpy as np
 from jaxtyping import ArrayLike
-from numpy.typing import NDArray
 
-from ..errors import InputError
-from ..models import BRDF, channels, parameter_values, parameters_of, variants
+from ..models import BRDF, channels
 from ..tables import Table
 from .coordinates import Chart, charts, into
 from .effort import DEFAULT, Effort
 from .estimate import Judgement, errors_of, judge, make_ready
+from .given import (
+    Model,
+    check_azimuth,
+    check_bounds,
+    check_names,
+    check_table,
+    given_start,
+    model_class,
+    name_of,
+    per_channel,
+)
 from .gram import Problem, Span
-from .grid_samples import compress
 from .losses import LOSSES, Loss, LossFunction, check_loss, named_loss
 from .plan import RUNGS, plan
+from .prepared import at_hand, prepare
 from .result import Fit, Named, Optimum
-from .samples import Samples, samples
+from .samples import Samples
 from .search import Found, Stage, search, solve
 from .solver import Box, Minimum
-from .spike import is_spike, largest_value, peak
-from .starts import Summary, starts, summarise
+from .spike import is_spike, peak
+from .starts import starts
 from .threads import in_threads
 from .timing import compilation
-
-Model = str | BRDF | type[BRDF]
 
 OPTIMAL = 1e-4
 """Cosine between residual and Jacobian below which a point counts as a first-order optimum: moving there would lower the
@@ -45,82 +50,6 @@ EXACT = 1e-8
 """Error, relative to what the parameters do to the residual, below which a fit is exact: polar tables are good to 3e-9."""
 BLACK = 1e-14
 """Error below which a fit is exact whatever the parameters: a black channel has nothing to be small against."""
-
-
-@dataclass(frozen=True)
-class Prepared:
-    """A table made ready for fits under one loss."""
-
-    samples: Samples
-    used: NDArray[np.bool_]
-    """Which cells are fitted."""
-    summary: Summary
-    loss: Loss
-    """The loss, bound to the table."""
-    losses: tuple[Loss, ...]
-    """Every loss that errors are reported under, bound to the table."""
-    largest: float
-    """The largest measured value, 1/sr."""
-    seconds: float
-    """What that took, nothing compiled: for all fits that share it."""
-
-
-_prepared: WeakKeyDictionary[Table, dict[Any, Prepared]] = WeakKeyDictionary()
-_preparing = threading.Lock()
-
-
-def prepare(
-    table: Table,
-    max_angle: float = 80.0,
-    measure: str = "solid_angle",
-    loss: Loss = LOSSES["log"],
-    effort: Effort = DEFAULT,
-) -> Prepared:
-    """Blocks, fitted cells and summary of a table, kept for the next model fitted to it."""
-    compressed = effort.path != "exact"
-    key = (max_angle, measure, loss, effort.nodes, compressed)
-    with jax.enable_x64(True), _preparing:
-        kept = _prepared.setdefault(table, {})
-        if key in kept:
-            return kept[key]
-        with compilation() as compiled:
-            begin = time.perf_counter()
-            cells, used = samples(table, max_angle, measure, effort.nodes)
-            values = table.planes[:, used]
-            bound = loss.bind(values)
-            summary = in_threads(lambda t: summarise(t, used), [table])
-            named = in_threads(lambda v: _named_losses(v, bound), [values])
-            kept.clear()
-            both = compress(cells, table, used, max_angle, measure, bound) if compressed else cells
-            summarised, losses, largest = next(summary), next(named), largest_value(table)
-            took = time.perf_counter() - begin - compiled.away
-        kept[key] = Prepared(both, used, summarised, bound, losses, largest, took)
-        return kept[key]
-
-
-def model_class(model: Model, anisotropic: bool) -> type[BRDF]:
-    """The class to fit: of a name, its form for the kind of table.
-
-    Raises ValueError for an unknown name, TypeError for what is no model.
-    """
-    if isinstance(model, str):
-        forms = variants(model)
-        return next((f for f in forms if f.anisotropic == anisotropic), forms[0])
-    cls = model if isinstance(model, type) else type(model)
-    if not issubclass(cls, BRDF) or not parameters_of(cls):
-        raise TypeError(
-            f"a model is a name, a brdfit.BRDF or a subclass of it with fields declared by brdfit.parameter, not {model!r}"
-        )
-    return cls
-
-
-def check_azimuth(cls: type[BRDF], where: str) -> None:
-    """Raise InputError for an anisotropic model; ``where`` names an isotropic table that it is to be fitted to."""
-    if cls.anisotropic:
-        raise InputError(
-            f"{where}: an anisotropic model needs the azimuth of the half vector, and this table is isotropic: fit "
-            f"{_name(cls)} to an anisotropic table, or another model to this one"
-        )
 
 
 def fit(
@@ -168,7 +97,7 @@ def fit(
         InputError: An anisotropic model, and the table is isotropic.
         TypeError: A table, model or loss that is neither a name nor the right kind of object.
     """
-    _check_table(table)
+    check_table(table)
     cls = model_class(model, (not table.isotropic) if anisotropic is None else anisotropic)
     if table.isotropic:
         check_azimuth(cls, table.source or table.material)
@@ -189,18 +118,14 @@ def fit(
     if tolerance is None and time_budget is None:
         return _fit(table, model, effort=effort, **options)
     cells = int(prepare(table, max_angle, measure, options["loss"]).used.sum())
-    chosen = plan(_name(cls), cells, tolerance, time_budget)
+    chosen = plan(name_of(cls), cells, tolerance, time_budget)
     spent = {"compile": 0.0, "solve": 0.0}
     while True:
         found = _fit(table, model, effort=RUNGS[chosen.rung], **options)
         spent = {piece: t + found.seconds[piece] for piece, t in spent.items()}
         if tolerance is None or not found.gain > tolerance / 2 or chosen.rung == len(RUNGS) - 1:
             return replace(found, plan=chosen, seconds={**found.seconds, **spent})
-        chosen = plan(_name(cls), cells, tolerance, time_budget, lowest=chosen.rung + 1)
-
-
-def _name(cls: type[BRDF]) -> str:
-    return getattr(cls, "name", cls.__name__.lower())
+        chosen = plan(name_of(cls), cells, tolerance, time_budget, lowest=chosen.rung + 1)
 
 
 def _fit(
@@ -220,9 +145,9 @@ def _fit(
     """As :func:`fit`, with settings that are known."""
     cls = model_class(model, (not table.isotropic) if anisotropic is None else anisotropic)
     held: Named = {n: np.asarray(v, float) for n, v in fixed.items()}
-    given = _given_start(cls, model, start, table)
-    _check_names(cls, {**held, **given, **dict(bounds)})
-    _check_bounds(cls, bounds)
+    given = given_start(cls, model, start, table)
+    check_names(cls, {**held, **given, **dict(bounds)})
+    check_bounds(cls, bounds)
     with jax.enable_x64(True), compilation() as compiled:
         ready = prepare(table, max_angle, measure, loss, effort)
         used, bound_loss = ready.used, ready.loss
@@ -232,7 +157,7 @@ def _fit(
             "source": table.source,
             "sha256": table.sha256,
             "angles": table.angles,
-            "model_name": _name(cls),
+            "model_name": name_of(cls),
             "loss": bound_loss.name,
             "measure": measure,
             "max_angle": max_angle,
@@ -248,8 +173,8 @@ def _fit(
         count = max(math.ceil(effort.shapes * len(every)), 0 if given else 1)
         proposals = [every[i * len(every) // count] for i in range(count)]
         if given:
-            proposals.insert(0, {**every[0], **_per_channel(cls, given, table.channels)})
-        proposals = [{**p, **_per_channel(cls, held, table.channels)} for p in proposals]
+            proposals.insert(0, {**every[0], **per_channel(cls, given, table.channels)})
+        proposals = [{**p, **per_channel(cls, held, table.channels)} for p in proposals]
         named = ready.losses
         if effort.error_bars:
             make_ready(Problem(ready.samples, bound_loss, forms[0]), named)
@@ -264,7 +189,7 @@ def _fit(
     if is_spike(model, ready.largest):
         warnings.append(
             f"it peaks at {peak(model):.2g}/sr, and no measured value is above {ready.largest:.2g}/sr: a lobe narrower than "
-            "the cells, which costs no error there and shows in pictures; fit with --loss ngan or another model"
+            "the cells, which costs no error there and shows in pictures; fit with --loss perceptual or ngan"
         )
     converged, reason = _verdict(found, effort.rtol)
     solve = time.perf_counter() - prepared - (compiled.away - early)
@@ -332,28 +257,18 @@ def evaluate(
 
     Raises ValueError if the model has neither one channel nor as many as the table, TypeError for what is no table or model.
     """
-    _check_table(table)
+    check_table(table)
     if not isinstance(model, BRDF):
         raise TypeError(f"evaluate takes a model with parameters (brdfit.model, fit.model), not {model!r}")
     if channels(model) not in (1, table.channels):
         raise ValueError(f"the model has {channels(model)} channels and the table {table.channels}")
     own = None if loss is None else named_loss(loss)
     with jax.enable_x64(True):
-        at_hand = (
-            p for key, p in _prepared.get(table, {}).items() if key[:2] == (max_angle, measure) and own in (None, key[2])
-        )
-        ready = next(at_hand, None) or prepare(
-            table, max_angle, measure, own or LOSSES["log"], replace(DEFAULT, path="exact")
-        )
+        exact = replace(DEFAULT, path="exact")
+        ready = at_hand(table, max_angle, measure, own) or prepare(table, max_angle, measure, own or LOSSES["log"], exact)
         named = tuple(x for x in ready.losses if own is not None or x.name in LOSSES)
         values = np.asarray(errors_of(model, ready.samples, named))
     return {e.name: float(v) for e, v in zip(named, values, strict=True)}
-
-
-def _named_losses(values: NDArray[np.float64], own: Loss) -> tuple[Loss, ...]:
-    """Every named loss, ready for these measured values, and one's own where it is not among them."""
-    named = tuple(loss.bind(values) for loss in LOSSES.values())
-    return named if own.name in LOSSES else (*named, own)
 
 
 def _search(
@@ -394,59 +309,6 @@ def _scaled(found: list[Found], error: float) -> tuple[Optimum, ...]:
     return tuple(Optimum(o.error / best * error, o.starts) for o in optima)
 
 
-def _check_table(table: Any) -> None:
-    if not isinstance(table, Table):
-        raise TypeError(f"a table is what brdfit.load or brdfit.measurements returns, not {table!r:.100}")
-
-
-def _given_start(cls: type[BRDF], model: Model, start: Mapping[str, ArrayLike] | str | None, table: Table) -> Named:
-    given = dict(parameter_values(model)) if isinstance(model, BRDF) else {}
-    if isinstance(start, str):
-        if start != "published":
-            raise ValueError(f"start is a mapping of parameters or 'published', not {start!r}")
-        from ..data.presets import published_start  # the numbers are read when they are asked for
-
-        start = published_start(_name(cls), table.material) if table.channels == 3 else None
-        start = start if start and set(start) == {p.name for p in parameters_of(cls)} else None
-    return given | {n: np.asarray(v, float) for n, v in (start or {}).items()}
-
-
-def _check_names(cls: type[BRDF], values: Mapping[str, Any]) -> None:
-    known = [p.name for p in parameters_of(cls)]
-    for name in values:
-        if name not in known:
-            raise ValueError(f"{cls.__name__} has no parameter {name!r}: it has {', '.join(known)}")
-
-
-def _check_bounds(cls: type[BRDF], bounds: Mapping[str, tuple[float, float]]) -> None:
-    for p in parameters_of(cls):
-        if p.name not in bounds:
-            continue
-        lower, upper = bounds[p.name]
-        if not (p.valid.lower <= lower < upper <= p.valid.upper):
-            raise ValueError(
-                f"{cls.__name__}: bounds of {p.name!r} must be lower < upper within {p.valid}, not {lower:g} and {upper:g}"
-            )
-
-
-def _per_channel(cls: type[BRDF], values: Named, channels: int) -> Named:
-    """Given values as arrays ``[C]`` or ``[]``, as each parameter is. Raises ValueError if one does not fit."""
-    out = {}
-    for p in parameters_of(cls):
-        if p.name not in values:
-            continue
-        v = values[p.name]
-        for x in v.ravel():
-            if x not in p.valid:
-                raise ValueError(f"{cls.__name__}: parameter {p.name!r} must lie in {p.valid}, not {x:g}")
-        try:
-            out[p.name] = np.broadcast_to(v, (channels,) if p.per_channel else ()).copy()
-        except ValueError:
-            wanted = f"a scalar or {channels} values" if p.per_channel else "a scalar"
-            raise ValueError(f"{cls.__name__}: parameter {p.name!r} is {wanted}, not of shape {list(v.shape)}") from None
-    return out
-
-
 def _verdict(found: list[Found], rtol: float) -> tuple[bool, str]:
     """Whether the fit converged, and why it stopped, in words; the worst channel speaks for all."""
     return min((_ending(f.minimum, rtol) for f in sorted(found, key=lambda f: -float(f.minimum.cost))), key=lambda v: v[0])
@@ -478,7 +340,7 @@ def failed(material: str, model: Model, reason: str, options: Mapping[str, Any])
         "source": "",
         "sha256": "",
         "angles": "",
-        "model_name": _name(cls),
+        "model_name": name_of(cls),
         "loss": named_loss(options.get("loss", "log")).name,
         "measure": options.get("measure", "solid_angle"),
         "max_angle": options.get("max_angle", 80.0),

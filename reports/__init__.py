@@ -9,7 +9,7 @@ def preload() -> None:
     """Import what drawing needs, when there is time for it."""
     import matplotlib.backends.backend_agg  # noqa: F401
 
-    from .colours import library
+    from ..colours import library
 
     library()
 

@@ -14,11 +14,11 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ..angles import directions, half_difference
+from ..colours import channel_names, delta_e, exposure_of, screen
+from ..evaluation import evaluate
+from ..physics import ANGLES, albedo_directions, albedo_of_values
 from ..tables import HalfDifferenceGrid, SphericalGrid, Table
-from .colours import channel_names, delta_e, exposure_of, screen
-from .evaluate import evaluate
 from .evidence import Albedo, Evidence, Lobes, Maps, Sphere
-from .physics import ANGLES, albedo_directions, albedo_of_values
 from .published_fits import published
 
 if TYPE_CHECKING:

@@ -10,8 +10,9 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from . import materials, physics, words
-from .colours import encode
+from .. import physics
+from ..colours import encode
+from . import materials, words
 from .evidence import Evidence, Published
 from .gather import fit_key
 from .words import significant

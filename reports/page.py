@@ -10,8 +10,8 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from .. import references
-from . import physics, plots, words
+from .. import physics, references
+from . import plots, words
 from .evidence import Evidence
 from .gather import fit_key
 from .model_section import anchor, model_view, physics_view

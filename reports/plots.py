@@ -12,7 +12,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from .colours import encode, luminance, screen
+from ..colours import encode, luminance, screen
 from .evidence import Albedo, Lobes, Maps, Sphere
 
 PALETTE = {

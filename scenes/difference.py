@@ -9,7 +9,7 @@ from __future__ import annotations
 import numpy as np
 from numpy.typing import NDArray
 
-from ..reports.colours import delta_e, encode, library, luminance, screen
+from ..colours import delta_e, encode, library, luminance, screen
 from .pixels import View
 from .scene import Reals
 

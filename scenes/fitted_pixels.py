@@ -21,12 +21,12 @@ from jaxtyping import Array, Float
 from numpy.typing import NDArray
 
 from ..angles import directions
+from ..colours import luminance
 from ..errors import InputError
 from ..geometry import Geometry, from_directions
+from ..physics import hemisphere
 from ..polar import PolarStencil
 from ..programs import program
-from ..reports.colours import luminance
-from ..reports.physics import hemisphere
 from ..tables import HalfDifferenceGrid, Table
 from .appearance import Look
 from .illumination import Illumination

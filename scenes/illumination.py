@@ -13,8 +13,8 @@ import numpy as np
 from jaxtyping import Array, Float
 from numpy.typing import NDArray
 
+from ..physics import FINE, hemisphere
 from ..polar import PolarStencil
-from ..reports.physics import FINE, hemisphere
 from .pixels import View, to_local
 from .scene import Ambient, Area, Directional, Environment, Point, Reals, Scene, Vector, unit
 
@@ -32,7 +32,7 @@ class Everywhere(eqx.Module):
     """The same radiance from everywhere, and the rule by which the albedo of a material is integrated.
 
     albedo(theta_o) = int f cos_i dwi at 64 polar angles, interpolated at those of the pixels: accurate to the quadrature
-    (half vectors, crowded where narrow lobes are), whose error :func:`brdfit.reports.physics.directional_albedo` states.
+    (half vectors, crowded where narrow lobes are), whose error :func:`brdfit.physics.directional_albedo` states.
     """
 
     radiance: Float[Array, " C"]

@@ -6,7 +6,7 @@ import jax
 import numpy as np
 
 from ..angles import directions
-from ..reports.physics import THETA_D, THETA_H, Width, half_way
+from ..physics import THETA_D, THETA_H, Width, half_way
 from .interpolated import Measured, evaluated
 from .rendering import cast
 
@@ -16,7 +16,7 @@ NARROWEST, WIDEST = 0.002, 1.0
 def lobe_alpha(table: Measured) -> float:
     """alpha of the GGX lobe of the same half-width, from :data:`NARROWEST` to :data:`WIDEST`.
 
-    The half-width is as in :func:`brdfit.reports.physics.lobe_width`, of the mean of the channels.
+    The half-width is as in :func:`brdfit.physics.lobe_width`, of the mean of the channels.
     """
     wi, wo = directions(THETA_H, THETA_D, np.pi / 2)
     with jax.enable_x64(True):

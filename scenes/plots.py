@@ -8,7 +8,7 @@ from typing import Any
 
 import numpy as np
 
-from ..reports.colours import encode, screen
+from ..colours import encode, screen
 from ..reports.plots import as_svg, data_uri, log_ticks, new_figure, png_uri, styled
 from ..tables import HalfDifferenceGrid
 from .choose import Tried

@@ -18,7 +18,7 @@ from jaxtyping import Array, Float
 from numpy.typing import NDArray
 
 from ..angles import half_difference
-from ..reports.colours import library, luminance
+from ..colours import library, luminance
 from ..tables import HalfDifferenceGrid
 from .difference import WHITE
 from .illumination import Extended, Illumination

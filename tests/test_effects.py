@@ -21,8 +21,8 @@ from brdfit.models import EFFECTS, build, ndf, parameters_of, variants
 from brdfit.models.effects import effect, in_order, parts_of
 from brdfit.models.gtr import GTR
 from brdfit.models.interreflection import compensation
+from brdfit.physics import hemisphere
 from brdfit.references import REFERENCES
-from brdfit.reports.physics import hemisphere
 from brdfit.scenes.choose import without
 
 from .cases import WI, WO

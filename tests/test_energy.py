@@ -12,7 +12,7 @@ import pytest
 from brdfit.data.presets import published_abc, published_sgd_smith
 from brdfit.data.published import published_materials
 from brdfit.models import BRDF, MODELS, parameters_of
-from brdfit.reports.physics import hemisphere
+from brdfit.physics import hemisphere
 from numpy.typing import NDArray
 
 Reals = NDArray[np.float64]

@@ -15,7 +15,7 @@ from brdfit import models
 from brdfit.geometry import from_directions
 from brdfit.models import BRDF, MODELS, blocks, fresnel, parameters_of
 from brdfit.models.lafortune import lobes
-from brdfit.reports.physics import hemisphere
+from brdfit.physics import hemisphere
 from brdfit.stability import measure, oracle, reference
 from brdfit.stability.parts import PARTS
 

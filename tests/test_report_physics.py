@@ -5,10 +5,10 @@ import math
 import brdfit
 import numpy as np
 import pytest
-from brdfit import references
+from brdfit import physics, references
+from brdfit.colours import delta_e, encode, exposure_of, screen
 from brdfit.models import MODELS, build, parameters_of, variants
-from brdfit.reports import materials, physics, words
-from brdfit.reports.colours import delta_e, encode, exposure_of, screen
+from brdfit.reports import materials, words
 from brdfit.reports.model_section import _f0_error, physics_view
 
 from .report_cases import GGX, fit_of

@@ -8,8 +8,8 @@ import colour
 import jax
 import numpy as np
 import pytest
+from brdfit.colours import luminance
 from brdfit.models.effects import EFFECTS, in_order
-from brdfit.reports.colours import luminance
 from brdfit.scenes.appearance import look, weighted
 from brdfit.scenes.choose import choose, possible, smaller, without
 from brdfit.scenes.difference import delta_itp, difference, ssim

@@ -10,12 +10,12 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from ..angles import directions
-from ..quadrature import gauss_legendre
-from .evaluate import evaluate
+from .angles import directions
+from .evaluation import evaluate
+from .quadrature import gauss_legendre
 
 if TYPE_CHECKING:
-    from ..models import BRDF
+    from .models import BRDF
 
 Reals = NDArray[np.float64]
 
@@ -93,7 +93,7 @@ def directional_albedo(brdf: Callable[[Reals, Reals], ArrayLike], angles: tuple[
 
     ``brdf`` is a model, which is evaluated in float64, or any function of unit vectors ``[n, 3]``.
     """
-    from ..models import BRDF, channels
+    from .models import BRDF, channels
 
     wi, wo, weights = albedo_directions(angles)
     values = evaluate(brdf, wi, wo, channels(brdf)) if isinstance(brdf, BRDF) else np.asarray(brdf(wi, wo), float)
@@ -120,7 +120,7 @@ def normal_reflectance(model: BRDF | None) -> Reals | None:
         return None
     import jax
 
-    from ..models import channels
+    from .models import channels
 
     with jax.enable_x64(True):
         values = [channel(model, c).normal_reflectance() for c in range(channels(model))]
@@ -177,8 +177,8 @@ def lobe_width(model: BRDF | None) -> Width | None:
     """
     if model is None or model.anisotropic:
         return None
-    from ..models import channels
-    from ..models.parts import Composition
+    from .models import channels
+    from .models.parts import Composition
 
     base = 0.0
     if isinstance(model, Composition) and model.parts.lobes:
@@ -199,7 +199,7 @@ def lobe_width(model: BRDF | None) -> Width | None:
 @cache
 def _program() -> Any:
     """The distribution D of facets, compiled; made on first use so that a module that needs no JAX does not import it."""
-    from ..programs import program
+    from .programs import program
 
     return program(lambda facets, sin2, cos2: facets(sin2, cos2))
 

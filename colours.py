@@ -13,7 +13,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 if TYPE_CHECKING:
-    from ..tables import Table
+    from .tables import Table
 
 Reals = NDArray[np.float64]
 

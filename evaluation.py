@@ -9,7 +9,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 if TYPE_CHECKING:
-    from ..models import BRDF
+    from .models import BRDF
 
 Reals = NDArray[np.float64]
 
@@ -39,6 +39,6 @@ def evaluate(model: BRDF | None, wi: Reals, wo: Reals, count: int) -> Reals:
 @cache
 def _program() -> Any:
     """The one compiled function, made on first use so that rebuilding a report does not import JAX for it."""
-    from ..programs import program
+    from .programs import program
 
     return program(lambda model, wi, wo: model(wi, wo))
