@@ -64,7 +64,7 @@ class PoulinFournier(BRDF):
     def shapes(cls, half_width: float) -> list[dict[str, float]]:
         """Lobes narrower and wider than that of the data, on cylinders that are nearly sunken, half sunken and raised."""
         profiles = ((2.3, -0.5), (3.0, 0.0), (3.0, 0.6))
-        return [{**e, "spacing": d, "elevation": h} for e in exponent_shapes(half_width) for d, h in profiles]
+        return [{**e, "spacing": d, "elevation": h} for e in exponent_shapes(half_width)[1:5] for d, h in profiles]
 
     def evaluate(self, g: Geometry) -> Float[Array, "..."]:
         """Value in 1/sr."""
