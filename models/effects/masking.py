@@ -17,9 +17,7 @@ from .effect import Effect, Present, replaces
 def _visibility(facets: Any, g: Geometry) -> Float[Array, "..."]:
     if not isinstance(facets, Stretched):
         return smith_correlated(facets, g)
-    if g.light is None or g.viewer is None:
-        raise ValueError("an anisotropic lobe with masking needs directions, and this geometry has none")
-    cosines = (facets.stretched_cosine(w) for w in (g.light, g.viewer))
+    cosines = (facets.stretched_cosine(w) for w in g.directions())
     light, viewer = (averted_area(facets.round, c) / c for c in cosines)
     return 0.25 / (g.cos_i * g.cos_o * (1 + light + viewer))
 
