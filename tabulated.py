@@ -16,7 +16,7 @@ from jaxtyping import Array, ArrayLike, Float
 
 from .geometry import Geometry, from_directions
 from .models import BRDF, parameters_of
-from .models.base import channel_axes, channels, in_session
+from .models.base import above_horizon, channel_axes, channels, in_session
 from .polar import PolarStencil, PolarTables
 from .programs import program
 
@@ -85,13 +85,8 @@ class Ready(eqx.Module):
 
     def __call__(self, wi: ArrayLike, wo: ArrayLike) -> Float[Array, "... C"]:
         """BRDF in 1/sr at unit vectors ``[..., 3]``; 0 below the horizon."""
-        wi, wo = jnp.broadcast_arrays(jnp.asarray(wi), jnp.asarray(wo))
+        above, wi, wo = above_horizon(wi, wo)
         what = jax.tree.map(in_session, self.what)
-        above = (wi[..., 2] > 0) & (wo[..., 2] > 0)
-        # Guard: below the horizon there is no polar angle to look up, and models divide by the cosines
-        # (tests/test_tabulated.py::test_below_the_horizon).
-        normal = jnp.zeros(3, wi.dtype).at[2].set(1)
-        wi, wo = (jnp.where(above[..., None], w, normal) for w in (wi, wo))
         return jnp.where(above[..., None], read(what, wi, wo), 0)
 
 

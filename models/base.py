@@ -12,7 +12,7 @@ import equinox as eqx
 import jax
 import jax.numpy as jnp
 import numpy as np
-from jaxtyping import Array, ArrayLike, Float
+from jaxtyping import Array, ArrayLike, Bool, Float
 
 from ..geometry import Geometry, from_directions
 from ..special import hold_slopes
@@ -127,16 +127,23 @@ class BRDF(eqx.Module):
 
         Zero, with zero gradient, where either direction is at or below the horizon.
         """
-        wi, wo = jnp.broadcast_arrays(jnp.asarray(wi), jnp.asarray(wo))
-        above = (wi[..., 2] > 0) & (wo[..., 2] > 0)
-        # Guard the input: below the horizon models divide by zero or take roots of negative numbers, and 0 * inf = NaN
-        # in the gradient (tests/test_models.py::test_finite).
-        normal = jnp.zeros(3, wi.dtype).at[2].set(1)
-        wi, wo = (jnp.where(above[..., None], w, normal) for w in (wi, wo))
+        above, wi, wo = above_horizon(wi, wo)
         model = jax.tree.map(in_session, self)
         single = jnp.result_type(wi, *jax.tree.leaves(model)) == jnp.float32
         values = _single_precision(model, wi, wo) if single else evaluate_channels(model, from_directions(wi, wo))
         return jnp.where(above[..., None], values, 0)
+
+
+def above_horizon(wi: ArrayLike, wo: ArrayLike) -> tuple[Bool[Array, "..."], Float[Array, "... 3"], Float[Array, "... 3"]]:
+    """Whether both unit vectors ``[..., 3]`` are above the horizon, and the vectors, the normal where one is not.
+
+    Guard: below the horizon models divide by zero or take roots of negative numbers, and 0 * inf = NaN in the gradient
+    (tests/test_models.py::test_finite, tests/test_tabulated.py::test_below_the_horizon).
+    """
+    wi, wo = jnp.broadcast_arrays(jnp.asarray(wi), jnp.asarray(wo))
+    above = (wi[..., 2] > 0) & (wo[..., 2] > 0)
+    normal = jnp.zeros(3, wi.dtype).at[2].set(1)
+    return above, jnp.where(above[..., None], wi, normal), jnp.where(above[..., None], wo, normal)
 
 
 def in_session(x: ArrayLike) -> Array:
