@@ -117,6 +117,8 @@ def main() -> None:
         f"{max(off):.1g}. The fits took {fitting:.0f} minutes and what compiled for them {compiling:.1f}, with as many fits "
         f"at a time as there are cores{f': {took / 60:.1f} minutes in all' if took > 60 else ''}."
     )
+    left_out = ", ".join(f"`{m}`" for m in MODELS if m not in ISOTROPIC)
+    settings += f" {left_out} has no isotropic form, and these tables do not tell the azimuth that it asks for."
     write(args.out, chosen, sorted(names), brdfit.load(tables[0]), command, settings)
     print(args.out)
 
