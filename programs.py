@@ -4,9 +4,11 @@ from __future__ import annotations
 
 import time
 import uuid
-from collections import defaultdict
+from collections import OrderedDict, defaultdict
 from collections.abc import Callable, Hashable, Sequence
+from contextlib import suppress
 from functools import cache, wraps
+from pathlib import Path
 from threading import Lock
 from typing import Any, NamedTuple, ParamSpec, TypeVar
 
@@ -19,16 +21,26 @@ from .stored_programs import Array, Placeholder
 P = ParamSpec("P")
 R = TypeVar("R")
 
-OPTIONS: dict[str, bool | str] = {
+OPTIONS: dict[str, bool | int | str] = {
+    "xla_cpu_parallel_codegen_split_count": 4,
     "xla_cpu_use_fusion_emitters": False,
     "xla_disable_hlo_passes": "while-loop-invariant-code-motion",
 }
 """XLA's newer way of generating loops takes up to twice as long to compile as the older one, and the programs are no faster
 for it (benchmarks/cold_start.py): the first fit of five models took 38 s of processor without it, 54 s with it.
 
+Into up to 32 parts XLA cuts a program, to compile them side by side, and each part takes memory maps of its own (see
+:data:`MAPS`). Of 4 parts the programs of six models took 1950 maps instead of 3320, and no longer to compile.
+
 What does not change in a loop over blocks, functions of the parameters, XLA moves out of it before it looks for calculations
 that are done twice: each column of a Jacobian then has its own copy, and all that depends on it is done again for each. Left
 in the loop they are found to be one: a pass of ``gtr`` takes 0.85 of the time, of ``lafortune`` a half, of ``htsg`` a third.
+"""
+
+MAPS = 0.75
+"""Share of a process's memory maps at which programs are dropped, those first that have not been used for longest. Guard: a
+program takes some fifty maps, Linux allows a process 65,530 (vm.max_map_count), and the compiler ends the process when it
+gets no more: fits of every model under every loss would come near it (tests/test_programs.py::test_maps_do_not_run_out).
 """
 
 
@@ -44,31 +56,74 @@ class _Compiled(NamedTuple):
         return jax.tree.map(lambda x: next(out) if isinstance(x, Placeholder) else x, self.result)
 
 
+_programs: OrderedDict[Hashable, _Compiled] = OrderedDict()
+"""By function and kind of arguments, in the order of their last use."""
+_access = Lock()
+_turns: defaultdict[Hashable, Lock] = defaultdict(Lock)
+"""Of threads that ask for the same program."""
+
+
 def program(function: Callable[P, R]) -> Callable[P, R]:
     """Compile a function for the shapes of its arrays; all else is static. For calls from Python, not from a program.
 
     Threads that ask at once for the same program wait for the one that compiles it. Where programs are stored
-    (:func:`brdfit.stored_programs.store_in`) one that an earlier run compiled is not even traced again.
+    (:func:`brdfit.stored_programs.store_in`) one that an earlier run compiled is not even traced again. A process that nears
+    the number of memory maps that it may have drops programs (:data:`MAPS`).
     """
-    made: dict[Hashable, _Compiled] = {}
-    turns: defaultdict[Hashable, Lock] = defaultdict(Lock)
 
     @wraps(function)
     def call(*args: P.args, **kwargs: P.kwargs) -> R:
         leaves, structure = jax.tree.flatten((args, kwargs))
         kinds = [Array(x.shape, str(x.dtype)) if hasattr(x, "dtype") else x for x in leaves]
-        kind = structure, *kinds, jnp.result_type(float)
-        if kind not in made:
+        kind = function, structure, *kinds, jnp.result_type(float)
+        made = _used(kind)
+        if made is None:
             asked = time.perf_counter()
-            with turns[kind]:
-                if kind in made:
-                    jax.monitoring.record_event_duration_secs(stored_programs.LOADED, time.perf_counter() - asked)
+            with _turns[kind]:
+                made = _used(kind)
+                if made is None:
+                    _make_room()
+                    made = _compiled(function, structure, leaves, kinds)
+                    with _access:
+                        _programs[kind] = made
                 else:
-                    made[kind] = _compiled(function, structure, leaves, kinds)
-        result: R = made[kind]([x for x in leaves if hasattr(x, "dtype")])
+                    jax.monitoring.record_event_duration_secs(stored_programs.LOADED, time.perf_counter() - asked)
+        result: R = made([x for x in leaves if hasattr(x, "dtype")])
         return result
 
     return call
+
+
+def _used(kind: Hashable) -> _Compiled | None:
+    """The program for such arguments, if there is one, now the last used."""
+    with _access:
+        made = _programs.get(kind)
+        if made is not None:
+            _programs.move_to_end(kind)
+        return made
+
+
+def _make_room() -> None:
+    """Drop the half of all programs that has not been used for longest if the process is short of memory maps."""
+    if _maps() > MAPS * _maps_allowed():
+        with _access:
+            for kind in list(_programs)[: (len(_programs) + 1) // 2]:
+                del _programs[kind]
+
+
+def _maps() -> int:
+    """Memory maps of this process; 0 where they are not counted."""
+    with suppress(OSError):
+        return Path("/proc/self/maps").read_bytes().count(b"\n")
+    return 0
+
+
+@cache
+def _maps_allowed() -> float:
+    """How many it may have."""
+    with suppress(OSError, ValueError):
+        return float(Path("/proc/sys/vm/max_map_count").read_text())
+    return float("inf")
 
 
 def _compiled(function: Callable[..., Any], structure: Any, leaves: list[Any], kinds: list[Any]) -> _Compiled:
@@ -101,7 +156,7 @@ def _compiled(function: Callable[..., Any], structure: Any, leaves: list[Any], k
 
 
 @cache
-def _understood() -> dict[str, bool | str]:
+def _understood() -> dict[str, bool | int | str]:
     """The options, or none: a compiler that does not know one of them refuses every program."""
     try:
         jax.jit(lambda: 0, compiler_options=OPTIONS)()

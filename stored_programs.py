@@ -64,7 +64,7 @@ def store_in(directory: str | os.PathLike[str] | None) -> None:
     _directory = None if directory is None else Path(directory)
 
 
-def key(function: Callable[..., Any], arguments: Any, options: dict[str, bool | str]) -> Path | None:
+def key(function: Callable[..., Any], arguments: Any, options: dict[str, bool | int | str]) -> Path | None:
     """Where the program of a function for such arguments is stored; None if nowhere."""
     if _directory is None:
         return None

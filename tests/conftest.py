@@ -33,6 +33,16 @@ def _not_stored():
         sys.modules["brdfit.stored_programs"].store_in(None)
 
 
+@pytest.fixture(autouse=True, scope="module")
+def _room_for_programs():
+    """JAX keeps all programs that tests compile, and a process that runs out of memory maps ends (brdfit/programs.py)."""
+    yield
+    if "brdfit.programs" in sys.modules:
+        programs = sys.modules["brdfit.programs"]
+        if programs._maps() > programs._maps_allowed() / 2:
+            sys.modules["jax"].clear_caches()
+
+
 @pytest.fixture(scope="module")
 def quickly():
     """For programs that run once: with few optimisations they compile in a third of the time."""

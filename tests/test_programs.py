@@ -53,6 +53,32 @@ def test_threads_share_one_program():
     assert traces == [2, 3]
 
 
+@pytest.mark.skipif(not programs._maps(), reason="memory maps are counted, and limited, on Linux")
+def test_maps_do_not_run_out(monkeypatch):
+    """A process that is allowed a hundred maps more drops the programs not used for longest, and makes them again."""
+    traces = []
+
+    @programs.program
+    def wave(x, times):
+        traces.append(times)
+        return jnp.sort(jnp.sin(times * x)) + jnp.cumsum(x)
+
+    x = jnp.arange(3.0)
+    programs._programs.clear()
+    wave(x, 0)
+    begin, most = programs._maps(), 0
+    monkeypatch.setattr(programs, "_maps_allowed", lambda: (begin + 100) / programs.MAPS)
+    for times in range(1, 61):
+        want = np.sort(np.sin(times * x)) + np.cumsum(x)
+        np.testing.assert_allclose(wave(x, times), want, rtol=1e-6, atol=1e-6)  # float32
+        most = max(most, programs._maps())
+        wave(x, 1)  # used all along: never dropped
+    assert most < begin + 150, "60 programs take some 700"
+    assert traces == list(range(61))
+    wave(x, 2)
+    assert traces[-1] == 2, "dropped, and made again"
+
+
 def test_threads_compute_in_double_precision():
     assert {x.dtype for x in in_threads(lambda k: jnp.asarray(1.0) * k, range(4))} == {np.dtype("float64")}
 
