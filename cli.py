@@ -317,11 +317,13 @@ def tradeoff_command(
 
     table = load(file, angles=angles)
     _keep_programs()
-    _checked_names(model or DEFAULT_MODELS, loss, [file] if table.isotropic else [])
+    names = _checked_names(model or DEFAULT_MODELS, loss, [file] if table.isotropic else [])
+    if model and len(names) > 1:
+        raise click.UsageError("--model takes one model here", click.get_current_context())
     out = folder(out_dir)
-    from .tradeoff import PIECES, tradeoff, write_tradeoff
+    from .tradeoff import pieces, tradeoff, write_tradeoff
 
-    with Progress(PIECES, silent=quiet) as progress:
+    with Progress(pieces(model), silent=quiet) as progress:
         result = tradeoff(table, model, loss=loss, max_angle=max_angle, progress=progress)
     page = write_tradeoff(out, result)
     if not quiet:

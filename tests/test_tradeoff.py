@@ -397,8 +397,8 @@ def test_every_form_has_a_counterpart():
 
 @pytest.fixture
 def quick(monkeypatch):
-    """Few directions, models and settings."""
-    monkeypatch.setattr(survey, "MODELS", {k: models.MODELS[k] for k in ("gtr", "ward")})
+    """Few directions and settings, and one model besides the one that is asked about."""
+    monkeypatch.setattr(survey, "MODELS", ("gtr",))
     monkeypatch.setattr(settings, "ROUNDS", 2)
     monkeypatch.setattr(survey, "WHOLE", 1e9)
     monkeypatch.setattr(sample, "COUNT", 64)
@@ -411,7 +411,7 @@ def quick(monkeypatch):
 
 def test_command(small_file, tmp_path, quick, capfd):
     out = tmp_path / "deep" / "out"
-    assert cli.run(["tradeoff", str(small_file), "--out", str(out), "--model", "ward"]) == 0
+    assert cli.run(["tradeoff", str(small_file), "--out", str(out), "--model", " Ward"]) == 0
     said = capfd.readouterr()
     assert said.out == f"tradeoff: {out / 'tradeoff.html'}\n"
     assert [line.split("] ")[1].split(":")[0] for line in said.err.splitlines()][2:] == [
@@ -451,6 +451,7 @@ def test_command(small_file, tmp_path, quick, capfd):
 def test_wrong_use_is_one_line_and_nothing_is_written(small_file, tmp_path, capfd):
     for arguments, words in (
         ([str(small_file), "--model", "minnaert"], "unknown model 'minnaert': choose from gtr"),
+        ([str(small_file), "--model", "gtr,phong"], "--model takes one model here"),
         ([str(small_file), "--loss", "l2"], "unknown loss 'l2'"),
         ([str(tmp_path / "none.binary")], "no such file"),
     ):
@@ -470,7 +471,7 @@ def test_a_model_that_fails_is_said_and_the_rest_goes_on(small_file, tmp_path, q
         return brdfit.fit(table, model, **options)
 
     monkeypatch.setattr(batch, "fit", fit)
-    assert cli.run(["tradeoff", str(small_file), "--out", str(tmp_path)]) == 1
+    assert cli.run(["tradeoff", str(small_file), "--out", str(tmp_path), "--model", "ward"]) == 1
     capfd.readouterr()
     text = Reader((tmp_path / "tradeoff.html").read_text()).text
     assert "out of luck" in text

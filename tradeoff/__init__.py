@@ -1,6 +1,6 @@
 """What accuracy costs in time, measured on the user's machine: settings of a fit, models to render with, approximations."""
 
 from .page import write_tradeoff
-from .survey import PIECES, Tradeoff, tradeoff
+from .survey import Tradeoff, pieces, tradeoff
 
-__all__ = ["PIECES", "Tradeoff", "tradeoff", "write_tradeoff"]
+__all__ = ["Tradeoff", "pieces", "tradeoff", "write_tradeoff"]

@@ -27,7 +27,7 @@ UNSEEN = 1e-3
 def settings_advice(measured: Sequence[Setting], optimum: Fit | None) -> str:
     """How hard to fit."""
     if not measured or optimum is None:
-        return "No model could be fitted, so that no setting could be measured."
+        return "Nothing asked for could be fitted, so that no setting could be measured."
     default = next((s for s in measured if s.family == "default"), measured[0])
     exact = next((s for s in measured if s.effort.path == "exact" and s.effort.cells == 1), None)
     said = (

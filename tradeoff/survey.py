@@ -9,6 +9,7 @@ import numpy as np
 
 from ..fitting import Fit, fit_many
 from ..fitting.spike import is_spike, largest_value
+from ..models import variants
 from ..progress import Progress
 from ..reports.words import SEEN, no_word
 from ..tables import Table
@@ -27,15 +28,29 @@ from .settings import Setting, settings
 from .smith import Quadrature, quadratures
 
 MODELS = ("gtr", "abc", "sgd", "ward", "ashikhmin_shirley", "lambert")
-"""What is compared: the models that are fitted by default, and a body without a lobe. All there are would take minutes."""
+"""What is compared in any case: the models that are fitted by default, and a body without a lobe. All there are would take
+minutes."""
 
-PIECES = len(MODELS) + 5
-"""Steps that :func:`tradeoff` reports to a progress."""
+QUESTIONS = 5
+"""What there is advice on."""
 
 WHOLE = 70.0
 """Seconds that all measurements may take: the settings of a fit, which come last, get what is left of them."""
 LEAST = 30.0
 """Seconds that the settings get in any case."""
+
+
+def compared(model: str | None = None) -> tuple[str, ...]:
+    """The models that are compared if ``model`` is asked about: :data:`MODELS`, and that one.
+
+    Raises ValueError for an unknown name.
+    """
+    return tuple(dict.fromkeys((*MODELS, variants(model)[0].name))) if model else MODELS
+
+
+def pieces(model: str | None = None) -> int:
+    """Steps that :func:`tradeoff` reports to a progress."""
+    return len(compared(model)) + QUESTIONS
 
 
 @dataclass(frozen=True)
@@ -69,26 +84,28 @@ def tradeoff(
 
     Args:
         table: What was measured.
-        model: Whose fitting settings are measured; by default that of the smallest ``perceptual`` error.
+        model: Whose fitting settings are measured; by default that of the smallest ``perceptual`` error. One that is not
+            among :data:`MODELS` is compared with them.
         loss: What fits minimise.
         measure: What a cell counts by, ``"solid_angle"`` or ``"cells"``.
         max_angle: Largest polar angle of either direction, degrees, in (0, 90).
-        progress: Where to say what was done, :data:`PIECES` times.
+        progress: Where to say what was done, :func:`pieces` times.
 
     Raises:
         InputError: No cell lies within ``max_angle``.
         ValueError: Unknown model, loss or measure.
     """
     begin = time.perf_counter()
-    progress = progress or Progress(PIECES, silent=True)
+    names = compared(model)
+    progress = progress or Progress(pieces(model), silent=True)
     sample = draw(table, max_angle, measure)
     fits: list[Fit] = []
     progress.say(f"{table.material}: fitting")
-    for f in fit_many([table], list(MODELS), loss=loss, measure=measure, max_angle=max_angle):
+    for f in fit_many([table], list(names), loss=loss, measure=measure, max_angle=max_angle):
         fits.append(f)
         took = f"{f.seconds['prepare'] + f.seconds['solve']:.2f} s"
         progress.advance(f"{f.model_name}: perceptual {f.errors['perceptual']:.5f}, {took}" if f.model else f.reason)
-    fits.sort(key=lambda f: list(MODELS).index(f.model_name))
+    fits.sort(key=lambda f: names.index(f.model_name))
     losses = tuple(dict.fromkeys(("perceptual", loss)))
     largest = largest_value(table)
     spikes = [f.model_name for f in fits if f.model is not None and is_spike(f.model, largest)]
@@ -114,7 +131,8 @@ def tradeoff(
     masking = approximations("masking", fits, table, sample, losses)
     advised("masking", masking_advice([a for a in masking if a.model not in spikes]))
     progress.say("settings of a fit")
-    usable = [f for f in fits if f.model is not None and f.model_name == (model or f.model_name)]
+    asked = variants(model)[0].name if model else None
+    usable = [f for f in fits if f.model is not None and f.model_name == (asked or f.model_name)]
     optimum, measured = None, list[Setting]()
     if usable:
         best = min(usable, key=lambda f: (f.model_name in spikes, f.errors["perceptual"]))
@@ -123,4 +141,4 @@ def tradeoff(
     return Tradeoff(table, tuple(fits), optimum, measured, drawn, rules, fresnel, masking, advice)
 
 
-__all__ = ["PIECES", "Tradeoff", "tradeoff"]
+__all__ = ["Tradeoff", "compared", "pieces", "tradeoff"]
