@@ -97,29 +97,31 @@ def all_cells(rows: list[Row], path: Path) -> list[float]:
         return list(pool.map(off, [r for r in rows if r["material"] == path.stem]))
 
 
-def main() -> None:
-    """Parse, fit what is missing, write."""
-    args = kept.arguments(__doc__)
-    tables = args.tables
-    rows, took = run(tables, args.keep)
+def page(out: Path, rows: list[Row], tables: list[Path], every: int, took: float) -> None:
+    """Write the page of some fits, which took so many seconds if one run made them all."""
     names = {p.stem for p in tables}
-    command = kept.command("comparison", "comparison", args.every)
     chosen = [r for r in rows if r["material"] in names]
     checked = tables[len(tables) // 2]
     off = all_cells(chosen, checked)
     fitting, compiling = (sum(r[k] for r in chosen) / 60 for k in ("seconds", "compile"))
     settings = (
         f"Fits are made of rows compressed along phi_d, {USUAL.starts} starts polished, to a relative decrease of the cost "
-        f"of {USUAL.rtol:g}; for "
-        f"{', '.join(f'`{m}`' for m in EFFORT)}, whose passes take longest, {COSTLY.starts} of half as "
-        f"many shapes, with half as many nodes a row, to {COSTLY.rtol:g}. Errors are those of the compressed rows: of the "
-        f"{len(off)} fits of {checked.stem} half are within {np.median(off):.1g} of the error of all cells and all within "
-        f"{max(off):.1g}. The fits took {fitting:.0f} minutes and what compiled for them {compiling:.1f}, with as many fits "
-        f"at a time as there are cores{f': {took / 60:.1f} minutes in all' if took > 60 else ''}."
+        f"of {USUAL.rtol:g}; for {', '.join(f'`{m}`' for m in EFFORT)}, whose passes take longest, {COSTLY.starts} of half "
+        f"as many shapes, with half as many nodes a row, to {COSTLY.rtol:g}. Errors are those of the compressed rows: of "
+        f"the {len(off)} fits of {checked.stem} half are within {np.median(off):.1g} of the error of all cells and all "
+        f"within {max(off):.1g}. The fits took {fitting:.0f} minutes and what compiled for them {compiling:.1f}, with as "
+        f"many fits at a time as there are cores{f': {took / 60:.1f} minutes in all' if took > 60 else ''}."
     )
     left_out = ", ".join(f"`{m}`" for m in MODELS if m not in ISOTROPIC)
     settings += f" {left_out} has no isotropic form, and these tables do not tell the azimuth that it asks for."
-    write(args.out, chosen, sorted(names), brdfit.load(tables[0]), command, settings)
+    write(out, chosen, sorted(names), brdfit.load(tables[0]), kept.command("comparison", "comparison", every), settings)
+
+
+def main() -> None:
+    """Parse, fit what is missing, write."""
+    args = kept.arguments(__doc__)
+    rows, took = run(args.tables, args.keep)
+    page(args.out, rows, args.tables, args.every, took)
     print(args.out)
 
 

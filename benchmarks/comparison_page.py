@@ -43,7 +43,7 @@ KINDS = {
 KIND = {material: kind for kind, materials in KINDS.items() for material in materials.split()}
 CLOSE = 1.1
 """A model whose error is below this multiple of the best one's is as good in practice."""
-CHEAPER, BEARABLE = 0.8, 3.0
+CHEAPER, BEARABLE = 0.9, 3.0
 """A model that costs less than this share of the best one's time is named, if its error is below this multiple."""
 REPEATS = 30
 LISTED = 40
