@@ -303,7 +303,9 @@ def stability_command(out_dir: str, draws: int | None, quiet: bool) -> int:
 @commands.command("tradeoff", short_help="Measure what accuracy costs in time.")
 @click.argument("file", metavar="FILE")
 @click.option("--out", "out_dir", required=True, metavar="DIR", help="Where tradeoff.html and tradeoff.json go.")
-@click.option("--model", help="Whose fitting settings are measured.  [default: the best by perceptual error]")
+@click.option(
+    "--model", help="Whose fitting settings are measured; compared with the usual models.  [default: the best of these]"
+)
 @click.option("--loss", default="log", show_default=True, help="What fits minimise.")
 @_angles
 @_max_angle
@@ -311,15 +313,16 @@ def stability_command(out_dir: str, draws: int | None, quiet: bool) -> int:
 def tradeoff_command(
     file: str, out_dir: str, model: str | None, loss: str, angles: Any, max_angle: float, quiet: bool
 ) -> int:
-    """Measure what accuracy costs in time, for the material of FILE on this machine; takes a minute and a half."""
+    """Measure what accuracy costs in time, for the material of FILE on this machine; takes a minute and a half or two."""
     from .progress import Progress
     from .tables import load
 
     table = load(file, angles=angles)
     _keep_programs()
-    names = _checked_names(model or DEFAULT_MODELS, loss, [file] if table.isotropic else [])
-    if model and len(names) > 1:
+    names = _checked_names(DEFAULT_MODELS if model is None else model, loss, [file] if table.isotropic else [])
+    if model is not None and len(names) > 1:
         raise click.UsageError("--model takes one model here", click.get_current_context())
+    model = model and names[0]
     out = folder(out_dir)
     from .tradeoff import pieces, tradeoff, write_tradeoff
 

@@ -11,8 +11,8 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from .angles import directions
-from .evaluation import evaluate
 from .quadrature import gauss_legendre
+from .values import values_of
 
 if TYPE_CHECKING:
     from .models import BRDF
@@ -96,7 +96,7 @@ def directional_albedo(brdf: Callable[[Reals, Reals], ArrayLike], angles: tuple[
     from .models import BRDF, channels
 
     wi, wo, weights = albedo_directions(angles)
-    values = evaluate(brdf, wi, wo, channels(brdf)) if isinstance(brdf, BRDF) else np.asarray(brdf(wi, wo), float)
+    values = values_of(brdf, wi, wo, channels(brdf)) if isinstance(brdf, BRDF) else np.asarray(brdf(wi, wo), float)
     return albedo_of_values(values, weights)
 
 
@@ -188,7 +188,7 @@ def lobe_width(model: BRDF | None) -> Width | None:
             facets = model.parts.lobes[0].facets(channel(model, 0))
             values = np.asarray(_program()(facets, np.sin(THETA_H) ** 2, np.cos(THETA_H) ** 2))
     else:
-        values = evaluate(model, *directions(THETA_H, THETA_D, np.pi / 2), channels(model))[:, 0]
+        values = values_of(model, *directions(THETA_H, THETA_D, np.pi / 2), channels(model))[:, 0]
         base = values[-1]
         if values[0] < PROMINENT * base:
             return None

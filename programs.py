@@ -58,7 +58,7 @@ class _Compiled(NamedTuple):
 
 _programs: OrderedDict[Hashable, _Compiled] = OrderedDict()
 """By function and kind of arguments, in the order of their last use."""
-_access = Lock()
+_access, _making_room = Lock(), Lock()
 _turns: defaultdict[Hashable, Lock] = defaultdict(Lock)
 """Of threads that ask for the same program."""
 
@@ -79,13 +79,16 @@ def program(function: Callable[P, R]) -> Callable[P, R]:
         made = _used(kind)
         if made is None:
             asked = time.perf_counter()
-            with _turns[kind]:
+            with _access:
+                turn = _turns[kind]
+            with turn:
                 made = _used(kind)
                 if made is None:
                     _make_room()
                     made = _compiled(function, structure, leaves, kinds)
                     with _access:
                         _programs[kind] = made
+                        _turns.pop(kind, None)
                 else:
                     jax.monitoring.record_event_duration_secs(stored_programs.LOADED, time.perf_counter() - asked)
         result: R = made([x for x in leaves if hasattr(x, "dtype")])
@@ -105,10 +108,11 @@ def _used(kind: Hashable) -> _Compiled | None:
 
 def _make_room() -> None:
     """Drop the half of all programs that has not been used for longest if the process is short of memory maps."""
-    if _maps() > MAPS * _maps_allowed():
-        with _access:
-            for kind in list(_programs)[: (len(_programs) + 1) // 2]:
-                del _programs[kind]
+    with _making_room:  # the next thread counts when they are gone
+        if _maps() > MAPS * _maps_allowed():
+            with _access:
+                dropped = [_programs.pop(kind) for kind in list(_programs)[: (len(_programs) + 1) // 2]]
+            del dropped  # here, where no thread waits for it
 
 
 def _maps() -> int:

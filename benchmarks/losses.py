@@ -21,9 +21,9 @@ from typing import Any
 import brdfit
 import kept
 import numpy as np
-from brdfit.evaluation import evaluate
 from brdfit.fitting import LOSSES
 from brdfit.reports.gather import sphere, sphere_directions
+from brdfit.values import values_of
 
 MODELS = ("gtr", "abc", "sgd", "ward", "ashikhmin_shirley")
 MEASURES = ("solid_angle", "cells")
@@ -41,7 +41,7 @@ def measured(path: Path) -> Iterator[Row]:
         brdfit.fit(table, model, loss=loss, measure=measure) for measure in MEASURES for loss in LOSSES for model in MODELS
     ]
     for fit in fits:
-        values = evaluate(fit.model, *directions[1:], table.channels)
+        values = values_of(fit.model, *directions[1:], table.channels)
         difference = sphere(table, directions, values[None], {}).difference
         yield {
             "material": table.material,

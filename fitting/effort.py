@@ -34,7 +34,7 @@ class Effort:
     """Relative decrease of the cost in a step below which the last search ends, in (0, 1)."""
     error_bars: bool = True
     """Whether every cell is asked at the end how sure the parameters are and whether the compressed table was good enough:
-    a third to half of a fit. Without, all of that is NaN and the path never changes; errors are still of all cells."""
+    a third to half of a fit. Without, all of that is NaN and the path never changes."""
     errors: str = "cells"
     """``"cells"``: errors are those of all cells, under every named loss. ``"rows"``, of a fit that ends on the compressed
     table and has no error bars: as its rows have it, under the loss that was fitted alone, the others NaN. It takes half off

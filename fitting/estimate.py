@@ -135,9 +135,8 @@ def _estimate(problem: Problem, x: Reals, box: Box, u: Uncertainty) -> Estimate:
 
 
 def make_ready(problem: Problem, losses: tuple[Loss, ...]) -> None:
-    """Compile what :func:`judge` will run, in a thread, by a pass over no blocks."""
-    x = np.zeros(problem.size)
-    in_threads(lambda span: _statistics(problem, x, losses, span), [Span(np.asarray(0), np.asarray(0))])
+    """Compile what :func:`judge` will run, by a pass over no blocks."""
+    _statistics(problem, np.zeros(problem.size), losses, Span(np.asarray(0), np.asarray(0)))
 
 
 def _label(row: tuple[str, int | None]) -> str:

@@ -36,7 +36,7 @@ from .result import Fit, Named, Optimum
 from .samples import Samples
 from .search import Found, Stage, search, solve
 from .solver import Box, Minimum
-from .spike import is_spike, peak
+from .spike import is_spike, peak, spike_warning
 from .starts import starts
 from .threads import in_threads
 from .timing import compilation
@@ -176,9 +176,13 @@ def _fit(
             proposals.insert(0, {**every[0], **per_channel(cls, given, table.channels)})
         proposals = [{**p, **per_channel(cls, held, table.channels)} for p in proposals]
         named = ready.losses
-        if effort.error_bars:
-            make_ready(Problem(ready.samples, bound_loss, forms[0]), named)
-        in_threads(peak, [cls(**proposals[0])])  # compiled while the search goes on
+
+        def last(first: BRDF) -> None:
+            if effort.error_bars:
+                make_ready(Problem(ready.samples, bound_loss, forms[0]), named)
+            peak(first)
+
+        in_threads(last, [cls(**proposals[0])])  # compiled by one thread while the others search
         found = _search(forms, ready.samples, bound_loss, proposals, frozenset(held), bounds, effort)
         found, judged = settle(found, Problem(ready.samples, bound_loss, found[0].problem.chart), named, effort)
         errors = dict(zip((e.name for e in named), map(float, judged.errors), strict=True))
@@ -187,10 +191,7 @@ def _fit(
         warnings.append("no published fit of this model to this material is known: it started from the data alone")
     model = cls(**judged.estimate.parameters)
     if is_spike(model, ready.largest):
-        warnings.append(
-            f"it peaks at {peak(model):.2g}/sr, and no measured value is above {ready.largest:.2g}/sr: a lobe narrower than "
-            "the cells, which costs no error there and shows in pictures; fit with --loss perceptual or ngan"
-        )
+        warnings.append(spike_warning(peak(model), ready.largest, bound_loss.name))
     converged, reason = _verdict(found, effort.rtol)
     solve = time.perf_counter() - prepared - (compiled.away - early)
     return Fit(

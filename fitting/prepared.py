@@ -82,7 +82,8 @@ def _named_losses(values: NDArray[np.float64], own: Loss) -> tuple[Loss, ...]:
 
 def at_hand(table: Table, max_angle: float, measure: str, loss: Loss | None) -> Prepared | None:
     """What is kept for a table and these settings, under a loss or, for None, under any."""
-    kept = (p for key, p in _prepared.get(table, {}).items() if key[:2] == (max_angle, measure) and loss in (None, key[2]))
+    every = list(_prepared.get(table, {}).items())  # a copy: another thread may prepare it meanwhile
+    kept = (p for key, p in every if key[:2] == (max_angle, measure) and loss in (None, key[2]))
     return next(kept, None)
 
 

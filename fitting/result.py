@@ -59,7 +59,8 @@ class Fit:
     converged: bool
     reason: str
     errors: dict[str, float]
-    """Error under every named loss, sqrt(sum w r^2 / sum w) over the fitted cells and channels."""
+    """Error under every named loss, sqrt(sum w r^2 / sum w) over the fitted cells and channels; NaN for what was not asked
+    for (``Effort(errors="rows")``)."""
     cells: dict[str, int]
     """used (fitted), masked (not measured), total; the rest is measured but beyond ``max_angle``."""
     seconds: dict[str, float]

@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+import math
+
 import jax
 import jax.numpy as jnp
 import numpy as np
@@ -38,4 +40,15 @@ def is_spike(model: BRDF, largest: float) -> bool:
     return not peak(model) <= FAR * largest
 
 
-__all__ = ["is_spike", "largest_value", "peak"]
+def spike_warning(peak: float, largest: float, loss: str) -> str:
+    """What to say of a spike that a fit under a loss ended with."""
+    if not math.isfinite(peak):
+        return f"its value at normal incidence is {peak}: do not render with it"
+    others = " or ".join(name for name in ("perceptual", "ngan") if name != loss)
+    return (
+        f"it peaks at {peak:.2g}/sr, and no measured value is above {largest:.2g}/sr: a lobe narrower than the cells, which "
+        f"costs no error there and shows in pictures; fit under the loss {others}"
+    )
+
+
+__all__ = ["is_spike", "largest_value", "peak", "spike_warning"]

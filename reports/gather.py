@@ -15,9 +15,9 @@ from numpy.typing import NDArray
 
 from ..angles import directions, half_difference
 from ..colours import channel_names, delta_e, exposure_of, screen
-from ..evaluation import evaluate
 from ..physics import ANGLES, albedo_directions, albedo_of_values
 from ..tables import HalfDifferenceGrid, SphericalGrid, Table
+from ..values import values_of
 from .evidence import Albedo, Evidence, Lobes, Maps, Sphere
 from .published_fits import published
 
@@ -70,7 +70,7 @@ class Views:
         """Values ``[n, C]`` of a fit in all directions, NaN without a model."""
         key = fit_key(fit)
         if key not in self._values:
-            self._values[key] = evaluate(fit.model, self._wi, self._wo, self.table.channels)
+            self._values[key] = values_of(fit.model, self._wi, self._wo, self.table.channels)
         return self._values[key]
 
     def evidence(self, fits: Sequence[Fit]) -> Evidence:

@@ -171,7 +171,12 @@ def _reflectance(evidence: Evidence | None) -> float:
 def _headline(material: str, ranked: Sequence[tuple[Fit, str]], reflectance: float) -> str:
     good = [(f, label) for f, label in ranked if math.isfinite(perceptual(f))]
     if not good:
-        return f"No model could be fitted to {material}."
+        unranked = any(f.parameters for f, _ in ranked)
+        return (
+            f"Fits to {material} without a perceptual error to rank them."
+            if unranked
+            else (f"No model could be fitted to {material}.")
+        )
     best, label = good[0]
     error = perceptual(best)
     among = f"Best of {words.number(len(ranked))}" if len(ranked) > 1 else "The one fit"
@@ -219,12 +224,14 @@ def _disagreement(evidence: Evidence | None, drawn: Sequence[tuple[int, str]]) -
 def _rank(rank: int, f: Fit, label: str, why: str) -> View:
     error = perceptual(f)
     words_of_it = why or words.grade(error)
+    if not math.isfinite(error):
+        words_of_it = "perceptual error not asked for" if f.parameters else f"failed: {f.reason}"
     return {
         "rank": str(rank) if math.isfinite(error) else words.NONE,
         "label": label,
         "error": significant(error, 3),
         "grade": None if why else words.grade_index(error),
-        "words": words_of_it if math.isfinite(error) else f"failed: {f.reason}",
+        "words": words_of_it,
         "numbers": sum(v.size for n, v in f.parameters.items() if n not in f.fixed) or words.NONE,
         "solve": words.seconds(f.seconds.get("solve", math.nan)),
         "doubt": math.isfinite(error) and not f.converged,
@@ -380,7 +387,7 @@ def _overview(sections: Sequence[View]) -> View:
         cells = []
         for n in heads:
             error, converged, grade = s["overview"].get(n, (math.nan, None, None))
-            text = significant(error, 2) if math.isfinite(error) else (words.NONE if converged is None else "failed")
+            text = significant(error, 2) if math.isfinite(error) else ("failed" if converged is False else words.NONE)
             cells.append({"text": text, "grade": grade, "best": n == best, "doubt": converged is False})
         rows.append({"material": s["material"], "anchor": s["anchor"], "cells": cells, "best": best or "none"})
     wins = {n: sum(r["best"] == n for r in rows) for n in heads}

@@ -84,9 +84,7 @@ def poulin_fournier(
 
     facing = l[2] * v[2]
     h = oracle._half(l, v)
-    x = exponent + 4
-    low = mp.sqrt(mpf(1) / 2)
-    albedo = 8 * mp.pi * (2 * (1 - low**x) / x - (1 - low ** (x - 2)) / (x - 2))  # as empirical.modified_blinn_phong
+    albedo = oracle.half_vector_albedo(exponent)
     body = diffuse / mp.pi * (antiderivative(last) - antiderivative(first) + floor * facing)
     lobe = specular / albedo * (_lobe(exponent, l, v, first, last) + floor * facing * h[2] ** exponent)
     return (body + lobe) / (spacing * facing)

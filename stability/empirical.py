@@ -66,12 +66,8 @@ def blinn_phong(l: Vector, v: Vector, diffuse: Any, specular: Any, exponent: Any
 
 
 def modified_blinn_phong(l: Vector, v: Vector, diffuse: Any, specular: Any, exponent: Any) -> Any:
-    """Schwenk (2011), eq. 28, over the integral of the lobe at normal incidence, int cos^e(t/2) cos(t) sin(t) dt 2 pi."""
-    x = exponent + 4
-    # with u = cos(t/2): sin(t) dt = -4 u du, cos(t) = 2 u^2 - 1, u from 1 down to sqrt(1/2)
-    low = mp.sqrt(mpf(1) / 2)
-    integral = 8 * mp.pi * (2 * (1 - low**x) / x - (1 - low ** (x - 2)) / (x - 2))
-    return diffuse / mp.pi + specular * _half(l, v)[2] ** exponent / integral
+    """Schwenk (2011), eq. 28, over the albedo of the lobe at normal incidence."""
+    return diffuse / mp.pi + specular * _half(l, v)[2] ** exponent / oracle.half_vector_albedo(exponent)
 
 
 def _polar(l: Vector, v: Vector) -> tuple[Any, Any, Any]:

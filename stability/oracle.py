@@ -75,6 +75,15 @@ def sgd(alpha: Any, p: Any, cosine: Any) -> Any:
     return mp.exp(-x) / (x**p * alpha * upper_gamma(1 - p, alpha) * mp.pi * cosine**4)
 
 
+def half_vector_albedo(exponent: Any) -> Any:
+    """Of the lobe (n.h)^e at normal incidence, int cos^e(t/2) cos(t) sin(t) dt 2 pi.
+
+    With u = cos(t/2): sin(t) dt = -4 u du, cos(t) = 2 u^2 - 1, u from 1 down to sqrt(1/2).
+    """
+    x, low = exponent + 4, mp.sqrt(mpf(1) / 2)
+    return 8 * mp.pi * (2 * (1 - low**x) / x - (1 - low ** (x - 2)) / (x - 2))
+
+
 # Smith masking --------------------------------------------------------------------------------------------------------
 
 

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from collections.abc import Callable
 
 import brdfit
@@ -15,6 +16,7 @@ from brdfit.data.synthetic import Floor, Missing, Relative, generate, scattered
 from brdfit.fitting.batch import fit_many
 from brdfit.fitting.losses import check_loss, named_loss
 from brdfit.fitting.result import from_record
+from brdfit.fitting.spike import spike_warning
 from brdfit.models import variants
 from brdfit.models.base import BRDF, parameter
 from brdfit.models.ward import Ward
@@ -280,6 +282,9 @@ def test_warnings():
     unknown, narrow = spike.warnings
     assert unknown.startswith("no published fit of this model to this material is known")
     assert "a lobe narrower than the cells" in narrow
+    assert narrow.endswith("fit under the loss perceptual or ngan")
+    assert spike_warning(1e4, 1.0, "ngan").endswith("fit under the loss perceptual")
+    assert spike_warning(math.nan, 1.0, "log") == "its value at normal incidence is nan: do not render with it"
     assert from_record(spike.record()).warnings == spike.warnings
 
 

@@ -41,6 +41,16 @@ def test_no_word_for_what_is_nearly_black(tmp_path, fits, evidence):
     assert "Dashed" not in text
 
 
+def test_fits_without_a_perceptual_error_did_not_fail(tmp_path):
+    """Those made with ``errors="rows"`` under another loss."""
+    fits = [fit_of("ward", WARD, 0.1, errors={"log": 0.1, "perceptual": math.nan}), failed()]
+    text = Reader(write_report(tmp_path, fits, [], {}).read_text()).text
+    assert "Fits to stuff without a perceptual error to rank them." in text
+    assert "perceptual error not asked for" in text
+    assert "failed: every start ended at infinite cost" in text
+    assert "failed: at a minimum" not in text
+
+
 def test_sphere_and_ranking_that_disagree_are_said(tmp_path, fits, evidence):
     """The ranking has gtr before ward."""
     off = evidence.sphere.difference.copy()

@@ -24,7 +24,7 @@ from brdfit.tradeoff.exchange import COUNTERPART, FRESNELS, MASKINGS, PARTS, exc
 from brdfit.tradeoff.pareto import front
 from brdfit.tradeoff.timing import Timing
 
-from .report_cases import Reader
+from .report_cases import Reader, fit_of
 
 MICROFACET = {
     "gtr": {"diffuse": [0.1, 0.05, 0.02], "specular": [0.9, 0.5, 0.04], "alpha": 0.15, "gamma": 1.7},
@@ -409,9 +409,20 @@ def quick(monkeypatch):
     monkeypatch.setattr(settings.settings, "__defaults__", (chosen,))
 
 
+def test_models_with_tables_are_timed_with_them(monkeypatch):
+    """Whatever their name: Smith's integral read from its table is what one renders with."""
+    monkeypatch.setattr(rendering, "BUDGET", 0.0)
+    model = models.model("epd", diffuse=0.1, specular=[0.9, 0.5, 0.4], alpha=0.2, p=0.8)
+    fit = fit_of("epd", {n: np.asarray(v) for n, v in parameter_values(model).items()}, 0.1)
+    drawn = rendering.renderings([fit], sampled(64))
+    assert [(r.label, r.masking) for r in drawn] == [("epd", "integral"), ("epd, table", "table")]
+    assert drawn[1].operations.flops < drawn[0].operations.flops
+    assert max(r.deviation for r in drawn) < 1e-3  # float32
+
+
 def test_command(small_file, tmp_path, quick, capfd):
     out = tmp_path / "deep" / "out"
-    assert cli.run(["tradeoff", str(small_file), "--out", str(out), "--model", " Ward"]) == 0
+    assert cli.run(["tradeoff", str(small_file), "--out", str(out), "--model", " Ward,"]) == 0
     said = capfd.readouterr()
     assert said.out == f"tradeoff: {out / 'tradeoff.html'}\n"
     assert [line.split("] ")[1].split(":")[0] for line in said.err.splitlines()][2:] == [

@@ -12,7 +12,6 @@ from jaxtyping import Array
 from ..fitting import Fit
 from ..tabulated import read, tabulate
 from .evaluation import Evaluation, Operations, direct
-from .exchange import PARTS
 from .sample import Sample
 from .timing import Timing, interleaved
 
@@ -46,13 +45,14 @@ def renderings(fits: Sequence[Fit], sample: Sample) -> list[Rendering]:
     wide: dict[tuple[str, str], Evaluation] = {}
     of = {f.model_name: f for f in fits if f.model is not None}
     for name, fit in of.items():
-        own = PARTS.get(type(fit.model))  # type: ignore[arg-type]
-        integral = own is not None and own.integral
+        assert fit.model is not None
+        made = tabulate(fit.model)
+        integral = bool(made.tables)
         ways: list[tuple[str, Callable[[Any, Array, Array], Array], Any]] = [
             ("integral" if integral else "", direct, fit.model)
         ]
-        if integral and fit.model is not None:
-            ways.append(("table", read, tabulate(fit.model)))
+        if integral:
+            ways.append(("table", read, made))
         for masking, function, what in ways:
             for dtype, programs in (("float32", narrow), ("float64", wide)):
                 programs[name, masking] = Evaluation(function, what, sample, dtype)

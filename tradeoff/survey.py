@@ -45,7 +45,7 @@ def compared(model: str | None = None) -> tuple[str, ...]:
 
     Raises ValueError for an unknown name.
     """
-    return tuple(dict.fromkeys((*MODELS, variants(model)[0].name))) if model else MODELS
+    return MODELS if model is None else tuple(dict.fromkeys((*MODELS, variants(model)[0].name)))
 
 
 def pieces(model: str | None = None) -> int:
@@ -131,8 +131,8 @@ def tradeoff(
     masking = approximations("masking", fits, table, sample, losses)
     advised("masking", masking_advice([a for a in masking if a.model not in spikes]))
     progress.say("settings of a fit")
-    asked = variants(model)[0].name if model else None
-    usable = [f for f in fits if f.model is not None and f.model_name == (asked or f.model_name)]
+    asked = names if model is None else (variants(model)[0].name,)
+    usable = [f for f in fits if f.model is not None and f.model_name in asked]
     optimum, measured = None, list[Setting]()
     if usable:
         best = min(usable, key=lambda f: (f.model_name in spikes, f.errors["perceptual"]))

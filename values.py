@@ -17,7 +17,7 @@ BLOCK = 4096
 """Directions that a model sees at once."""
 
 
-def evaluate(model: BRDF | None, wi: Reals, wo: Reals, count: int) -> Reals:
+def values_of(model: BRDF | None, wi: Reals, wo: Reals, count: int) -> Reals:
     """Values ``[n, C]`` of a fitted model in float64; NaN without a model."""
     if model is None:
         return np.full((len(wi), count), np.nan)
