@@ -1,4 +1,4 @@
-"""What each rung of settings gives and takes on real materials: makes fitting/rungs.json, and with --check a page of tries.
+"""What each rung of settings gives and takes on real materials: makes fitting/rungs.json, and says how many tries hold.
 
     python benchmarks/rungs.py TABLES --best-known best_known.csv --keep rungs.jsonl --out rungs.json
 
