@@ -125,7 +125,8 @@ def test_second_derivatives_are_finite(row: Row):
 
     points = row.points(WI[few], WO[few]).reshape(-1, len(part.arguments))
     with jax.enable_x64(True):
-        assert np.isfinite(jax.jit(jax.vmap(along))(jnp.asarray(points))).all()
+        second = jax.jit(jax.vmap(along), compiler_options=measure.QUICKLY)
+        assert np.isfinite(second(jnp.asarray(points))).all()
 
 
 @pytest.mark.parametrize("row", [r for r in TABLE if r.reciprocal], ids=lambda r: r.name)
