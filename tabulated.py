@@ -43,7 +43,8 @@ def tabulate(model: BRDF) -> Tabulated:
 def _tables(model: BRDF) -> list[Array]:
     one = jnp.ones(1)
     at = PolarStencil.to_horizon(one, 0 * one)
-    g = Geometry(one, one, one, 0 * one, one, 0 * one, 0 * one, 0 * one, at, at)
+    normal = jnp.array([[0.0, 0.0, 1.0]])
+    g = Geometry(one, one, one, 0 * one, one, 0 * one, 0 * one, 0 * one, at, at, light=normal, viewer=normal)
 
     def make(m: BRDF) -> list[Array]:
         tables = PolarTables()

@@ -104,13 +104,14 @@ def page(out: Path, rows: list[Row], tables: list[Path], every: int, took: float
     checked = tables[len(tables) // 2]
     off = all_cells(chosen, checked)
     fitting, compiling = (sum(r[k] for r in chosen) / 60 for k in ("seconds", "compile"))
+    whole = f": {took / 60:.1f} minutes in all" if took > 60 else ""
     settings = (
         f"Fits are made of rows compressed along phi_d, {USUAL.starts} starts polished, to a relative decrease of the cost "
         f"of {USUAL.rtol:g}; for {', '.join(f'`{m}`' for m in EFFORT)}, whose passes take longest, {COSTLY.starts} of half "
         f"as many shapes, with half as many nodes a row, to {COSTLY.rtol:g}. Errors are those of the compressed rows: of "
-        f"the {len(off)} fits of {checked.stem} half are within {np.median(off):.1g} of the error of all cells and all "
-        f"within {max(off):.1g}. The fits took {fitting:.0f} minutes and what compiled for them {compiling:.1f}, with as "
-        f"many fits at a time as there are cores{f': {took / 60:.1f} minutes in all' if took > 60 else ''}."
+        f"the {len(off)} fits of {checked.stem} half are within {np.median(off):.1g}, relative, of the error of all "
+        f"cells and all within {max(off):.1g}. The fits took {fitting:.0f} minutes and what compiled for them "
+        f"{compiling:.1f}, with as many fits at a time as there are cores{whole}."
     )
     left_out = ", ".join(f"`{m}`" for m in MODELS if m not in ISOTROPIC)
     settings += f" {left_out} has no isotropic form, and these tables do not tell the azimuth that it asks for."

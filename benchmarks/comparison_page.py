@@ -60,7 +60,7 @@ By loss and for all three: the error over the smallest of any model on the same 
 materials; *worst*, the largest such ratio of any material and loss. *Numbers*: parameters of three channels. *At a
 bound*: fits in which a parameter that bends the lobe ends at a bound of its search box; colours at 0 do not count.
 *Fit*: seconds of the search, nothing compiled, as many fits at a time as there are cores. *ns*: one pair of directions,
-three channels, float32, one core. Both are lower quartiles."""
+three channels, float32, one core, Smith's masking read from its table (`brdfit.ready`). Both are lower quartiles."""
 
 SCHLICK = """\
 Their Fresnel factor is Schlick's: it reflects all

@@ -46,7 +46,7 @@ class Effort:
         if self.errors not in ERRORS:
             raise ValueError(f"effort: unknown errors {self.errors!r}: choose from {', '.join(ERRORS)}")
         if self.errors == "rows" and self.error_bars:
-            raise ValueError("effort: error bars ask every cell, which gives the errors of all: errors='rows' is without")
+            raise ValueError("effort: errors='rows' goes without error bars, which ask every cell; add error_bars=False")
         if self.nodes < 2:
             raise ValueError(f"effort: nodes must be at least 2, not {self.nodes}")
         if not 0 < self.cells <= 1:

@@ -32,7 +32,7 @@ from .gram import Problem, Span
 from .losses import LOSSES, Loss, LossFunction, check_loss, named_loss
 from .plan import RUNGS, plan
 from .prepared import at_hand, prepare
-from .result import Fit, Named, Optimum
+from .result import EXACT_FIT, Fit, Named, Optimum
 from .samples import Samples
 from .search import Found, Stage, search, solve
 from .solver import Box, Minimum
@@ -325,7 +325,7 @@ def _ending(end: Minimum, rtol: float) -> tuple[bool, str]:
     if not np.isfinite(error) or error > 1e140:
         return False, "no start gave a finite error: the model or the loss is not defined where the data are"
     if _exact(end):
-        return True, f"exact fit: the error is {error:.1g}, which is rounding"
+        return True, f"{EXACT_FIT}: the error is {error:.1g}, which is rounding"
     if not bool(end.stopped):
         return False, f"stopped at the limit of {steps} steps; the gradient is still {cosine:.1g} (cosine to the residual)"
     if cosine > max(OPTIMAL, math.sqrt(rtol)):

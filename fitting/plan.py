@@ -63,8 +63,8 @@ def plan(model: str, cells: int, tolerance: float | None, time_budget: float | N
 
     Raises ValueError for a tolerance outside (0, 1) or a budget that is not positive.
     """
-    if tolerance is not None and not 0 < tolerance < 1:
-        raise ValueError(f"a tolerance is a share of the error in (0, 1), not {tolerance:g}")
+    if tolerance is not None and not (isinstance(tolerance, float | int | np.number) and 0 < tolerance < 1):
+        raise ValueError(f"a tolerance is a share of the error in (0, 1), not {tolerance!r}")
     if time_budget is not None and not 0 < time_budget < float("inf"):
         raise ValueError(f"a time budget is a positive number of seconds, not {time_budget:g}")
     known = expected(model, cells)

@@ -16,6 +16,8 @@ from .plan import Plan
 Reals = NDArray[np.float64]
 Named = dict[str, Reals]
 
+EXACT_FIT = "exact fit"
+"""How the reason begins of a fit whose error is rounding."""
 CLEAR = 2.0
 """How many times the other an error bar is that limits a parameter. A jackknife over B bands is itself known to about
 1/sqrt(2 (B - 1)), less where bands count unevenly, and where the model is right both bars estimate the same."""

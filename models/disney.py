@@ -103,7 +103,8 @@ class Disney(BRDF):
 class DisneyAnisotropic(BRDF):
     """As :class:`Disney` with D = 1/(pi a_x a_y (h_x^2/a_x^2 + h_y^2/a_y^2 + (n.h)^2)^2),
     a_x = max(0.001, roughness^2/aspect), a_y = max(0.001, roughness^2 aspect), aspect = sqrt(1 - 0.9 anisotropy)
-    (Burley 2012, section 5.4 and appendix B.2).
+    (Burley 2012, section 5.4 and appendix B.2). The lobe is longer along the tangent alone: where a fit ends at
+    anisotropy = 0, turn the table by 90 degrees.
     """
 
     name: ClassVar[str] = "disney"

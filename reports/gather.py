@@ -130,7 +130,7 @@ def interpolate(table: Table, wi: Reals, wo: Reals) -> Reals:
         real = table.mask[index]
         known &= real | ~used
         for plane, out in zip(table.planes, total, strict=True):
-            out += np.where(used & real, weight * plane[index], 0.0)
+            out += weight * np.where(used & real, plane[index], 0.0)
     return np.where(known, total, np.nan).T
 
 

@@ -52,6 +52,8 @@ def physics_view(f: Fit, label: str, evidence: Evidence | None, rows: dict[str, 
         m = rows[fit_key(f)]
         angles = tuple(float(a) for a in evidence.albedo.theta_i)
         view["energy"] = physics.energy_verdict(evidence.albedo.fitted[m], evidence.albedo.error[m], angles)
+        if f.model is not None and f.model.anisotropic:
+            view["energy"] += ", for light along the tangent; of other azimuths this says nothing"
         view["energy_warn"] = view["energy"].startswith(("returns", "albedo"))
     return view
 
@@ -277,7 +279,11 @@ def _remarks(f: Fit, channel_names: tuple[str, ...]) -> list[View]:
     known = {n for u in (f.stderr, f.spread) for n, v in u.items() if np.isfinite(v).any()}
     governing = {n: g for n, g in f.governing().items() if n in known}
     misfit = [n for n, g in governing.items() if g == "spread"]
-    if misfit and len(misfit) == len(governing):
+    from ..fitting.result import EXACT_FIT
+
+    if f.reason.startswith(EXACT_FIT):
+        say("an exact fit: what is left of the error is rounding, and so are the error bars.")
+    elif misfit and len(misfit) == len(governing):
         say(
             "for every parameter the spread over angular bands is at least twice the noise: what limits these numbers is "
             "the form of the model, not the measurement."

@@ -89,7 +89,7 @@ def test_errors_by_rows(table, loss):
     assert by_rows.errors[loss] == pytest.approx(by_cells.errors[loss], rel=1e-3)
     assert {name for name, e in by_rows.errors.items() if np.isfinite(e)} == {loss}
     assert by_rows.passes == by_cells.passes - 1
-    with pytest.raises(ValueError, match="error bars ask every cell"):
+    with pytest.raises(ValueError, match="errors='rows' goes without error bars, which ask every cell"):
         Effort(errors="rows")
 
 

@@ -94,6 +94,15 @@ def test_same_table_same_bytes(tmp_path):
     assert (tmp_path / "a.h5").read_bytes() == (tmp_path / "b.h5").read_bytes()
 
 
+def test_degrees_are_refused(tmp_path):
+    grid = LAYOUTS["half_difference"]
+    axes = {f.name: getattr(grid, f.name) for f in fields(HalfDifferenceGrid)}
+    turned = HalfDifferenceGrid(**{n: None if a is None else np.degrees(a) for n, a in axes.items()})
+    write_hdf5(tmp_path / "a.h5", table(np.ones((1, *grid.shape)), turned, "a"))
+    with pytest.raises(brdfit.InputError, match=r"a\.h5: \w+ reaches [\d.]+, and angles are in radians; convert them"):
+        read_hdf5(tmp_path / "a.h5")
+
+
 def test_no_channel_names(tmp_path):
     write_hdf5(tmp_path / "a.h5", table(np.ones((2, 3, 2, 4)), LAYOUTS["merl"], "a"))
     assert read_hdf5(tmp_path / "a.h5").channel_names == ()

@@ -86,6 +86,12 @@ def test_fit_within_a_tolerance(small_table):
     assert planned(best) == ""
 
 
+def test_a_tolerance_is_a_number(small_table):
+    for wrong in ("1%", 1.0, 0):
+        with pytest.raises(ValueError, match="a tolerance is a share of the error in"):
+            brdfit.fit(small_table[0], "ward", tolerance=wrong)
+
+
 def test_better_settings_follow_where_much_is_left_to_gain(small_table, ladder, monkeypatch):
     """A ladder that promises too much is found out by the cells."""
     table = small_table[0]

@@ -44,6 +44,8 @@ def test_same_values(model):
 def test_models_without_an_integral_are_ready():
     ward = brdfit.model("ward", diffuse=0.1, specular=0.2, alpha=0.3)
     assert brdfit.ready(ward) is ward
+    cylinders = brdfit.model("poulin_fournier", diffuse=0.1, specular=0.2, exponent=9.0, spacing=3.0, elevation=0.0)
+    assert brdfit.ready(cylinders) is cylinders, "it asks for the directions themselves"
 
 
 def test_normal_incidence():

@@ -327,18 +327,19 @@ def form(name, own, seconds, error, flops=100.0):
     [
         (
             *(10, 50, 0.0105),
-            "In gtr take V-cavity masking, not Smith masking: about as good, with fewer operations; V-cavity masking is 10 "
+            "In gtr take V-cavity masking, not Smith masking: to the eye about as good, with fewer operations; V-cavity "
+            "masking is 10 "
             "times as fast (\u221250.0 % operations)",
         ),
         (
             10,
             50,
             0.0120,
-            "In gtr keep Smith masking, not V-cavity masking: the error is larger; V-cavity masking is 10 times",
+            "In gtr keep Smith masking, not V-cavity masking: the perceptual error is larger; V-cavity masking is 10 times",
         ),
         (
             *(100, 95, 0.0101),
-            "keep Smith masking, not V-cavity masking: about as good, but it saves less than a tenth of the operations; "
+            "keep Smith masking, not V-cavity masking: to the eye about as good, but hardly fewer operations; "
             "V-cavity masking takes the same time as far as can be told (\u22125.0 % operations), moves 1 value in 100 by "
             "more than 2.0 % and, fitted again, changes the error by +1.0 %",
         ),
@@ -346,7 +347,7 @@ def form(name, own, seconds, error, flops=100.0):
             300,
             300,
             0.0080,
-            "take V-cavity masking, not Smith masking: the error is smaller; V-cavity masking takes 3.0 times",
+            "take V-cavity masking, not Smith masking: the perceptual error is smaller; V-cavity masking takes 3.0 times",
         ),
     ],
 )

@@ -151,10 +151,10 @@ def _exchange_advice(forms: Sequence[Approximation], nothing: str) -> str:
         better = changes["perceptual"] < 1 / NEARLY - 1
         worse = changes["perceptual"] > NEARLY - 1
         if better or (cheaper and not worse):
-            why = "the error is smaller" if better else "about as good, with fewer operations"
+            why = "the perceptual error is smaller" if better else "to the eye about as good, with fewer operations"
             verdict = f"take {its}, not {mine}: {why}"
         else:
-            why = "the error is larger" if worse else "about as good, but it saves less than a tenth of the operations"
+            why = "the perceptual error is larger" if worse else "to the eye about as good, but hardly fewer operations"
             verdict = f"keep {mine}, not {its}: {why}"
         effect = listed(f"{_signed(v)} ({k})" for k, v in changes.items())
         said.append(
