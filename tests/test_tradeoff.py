@@ -339,7 +339,7 @@ def form(name, own, seconds, error, flops=100.0):
         ),
         (
             *(100, 95, 0.0101),
-            "keep Smith masking, not V-cavity masking: to the eye about as good, but hardly fewer operations; "
+            "keep Smith masking, not V-cavity masking: to the eye about as good, and not clearly cheaper; "
             "V-cavity masking takes the same time as far as can be told (\u22125.0 % operations), moves 1 value in 100 by "
             "more than 2.0 % and, fitted again, changes the error by +1.0 %",
         ),

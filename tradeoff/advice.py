@@ -154,7 +154,7 @@ def _exchange_advice(forms: Sequence[Approximation], nothing: str) -> str:
             why = "the perceptual error is smaller" if better else "to the eye about as good, with fewer operations"
             verdict = f"take {its}, not {mine}: {why}"
         else:
-            why = "the perceptual error is larger" if worse else "to the eye about as good, but hardly fewer operations"
+            why = "the perceptual error is larger" if worse else "to the eye about as good, and not clearly cheaper"
             verdict = f"keep {mine}, not {its}: {why}"
         effect = listed(f"{_signed(v)} ({k})" for k, v in changes.items())
         said.append(
