@@ -106,6 +106,11 @@ class Fit:
         ]
         return sorted(pairs, key=lambda p: -abs(p[2]))
 
+    @property
+    def exact(self) -> bool:
+        """Whether the error is rounding, so that its error bars are, too."""
+        return self.reason.startswith(EXACT_FIT)
+
     def governing(self) -> dict[str, str]:
         """For each parameter what limits it: noise (``"stderr"``), the form of the model (``"spread"``), or ``"both"``.
 

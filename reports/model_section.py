@@ -279,9 +279,7 @@ def _remarks(f: Fit, channel_names: tuple[str, ...]) -> list[View]:
     known = {n for u in (f.stderr, f.spread) for n, v in u.items() if np.isfinite(v).any()}
     governing = {n: g for n, g in f.governing().items() if n in known}
     misfit = [n for n, g in governing.items() if g == "spread"]
-    from ..fitting.result import EXACT_FIT
-
-    if f.reason.startswith(EXACT_FIT):
+    if f.exact:
         say("an exact fit: what is left of the error is rounding, and so are the error bars.")
     elif misfit and len(misfit) == len(governing):
         say(

@@ -171,12 +171,9 @@ def _reflectance(evidence: Evidence | None) -> float:
 def _headline(material: str, ranked: Sequence[tuple[Fit, str]], reflectance: float) -> str:
     good = [(f, label) for f, label in ranked if math.isfinite(perceptual(f))]
     if not good:
-        unranked = any(f.parameters for f, _ in ranked)
-        return (
-            f"Fits to {material} without a perceptual error to rank them."
-            if unranked
-            else (f"No model could be fitted to {material}.")
-        )
+        if any(f.parameters for f, _ in ranked):
+            return f"Fits to {material} without a perceptual error to rank them."
+        return f"No model could be fitted to {material}."
     best, label = good[0]
     error = perceptual(best)
     among = f"Best of {words.number(len(ranked))}" if len(ranked) > 1 else "The one fit"

@@ -176,8 +176,7 @@ def _check_axes(path: StrPath, found: dict[str, NDArray[np.float64]]) -> None:
             raise _odd(path, f"{name} has positions {positions.shape} and edges {edges.shape}, one more is needed")
         if not (np.isfinite(positions).all() and np.isfinite(edges).all() and (np.diff(edges) > 0).all()):
             raise _odd(path, f"{name} has angles that are not finite or edges that do not ascend")
-        most = np.pi / 2 if name.startswith("theta") else 4 * np.pi
-        if max(positions.max(), edges.max()) > most * (1 + 1e-6):
+        if edges.max() > (np.pi if name.startswith("theta") else 4 * np.pi) * (1 + 1e-6):
             raise InputError(f"{path}: {name} reaches {edges.max():.4g}, and angles are in radians; convert them")
 
 

@@ -103,6 +103,14 @@ def test_degrees_are_refused(tmp_path):
         read_hdf5(tmp_path / "a.h5")
 
 
+def test_viewers_below_the_horizon_are_read(tmp_path):
+    """A goniometer may go round the whole sphere: what lies below is not measured, and no degrees."""
+    grid = LAYOUTS["spherical"]
+    whole = replace(grid, theta_o_edges=np.array([0.0, 1.0, np.pi]))
+    write_hdf5(tmp_path / "a.h5", table(np.ones((1, *grid.shape)), whole, "a"))
+    np.testing.assert_array_equal(read_hdf5(tmp_path / "a.h5").layout.theta_o_edges, whole.theta_o_edges)
+
+
 def test_no_channel_names(tmp_path):
     write_hdf5(tmp_path / "a.h5", table(np.ones((2, 3, 2, 4)), LAYOUTS["merl"], "a"))
     assert read_hdf5(tmp_path / "a.h5").channel_names == ()

@@ -328,8 +328,7 @@ def form(name, own, seconds, error, flops=100.0):
         (
             *(10, 50, 0.0105),
             "In gtr take V-cavity masking, not Smith masking: to the eye about as good, with fewer operations; V-cavity "
-            "masking is 10 "
-            "times as fast (\u221250.0 % operations)",
+            "masking is 10 times as fast (\u221250.0 % operations)",
         ),
         (
             10,
